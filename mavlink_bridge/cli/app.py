@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from copy import copy
 from difflib import get_close_matches
 from functools import cache
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -19,6 +21,7 @@ from mavlink_bridge.cli.failing import (
     is_reader_gone,
     report,
     report_defect,
+    report_full_stdout,
 )
 from mavlink_bridge.cli.terminal import echo, echo_help, says_no_colour
 
@@ -127,6 +130,8 @@ def _exit_code(run: Any, words: list[str]) -> int:  # noqa: ANN401 - a function 
     except Exception as error:  # noqa: BLE001 - the last place where one can be reported
         if is_reader_gone(error):
             return drop_stdout()
+        if (full := report_full_stdout(command, error)) is not None:
+            return full
         if getattr(error, "exit_code", None) == ExitCode.USAGE and hasattr(error, "format_message"):
             _report_usage(error, command, wants_json=wants_json)
             return ExitCode.USAGE
@@ -183,6 +188,10 @@ def _app(
 
 def main() -> None:
     """Run the command line."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by who called (>&-)
+            nowhere = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - for as long as the program runs
+            setattr(sys, name, nowhere)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a console that has no × shows a ? for it
             stream.reconfigure(errors="replace")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +27,7 @@ COLUMNS = (
 )  # fmt: skip
 """What a row may say. Another column is refused: a misspelt one would be passed over, and a plan made that nobody asked for."""
 
+_MOST_LINE = 10_000  # characters, of which the names of the columns are in a few hundred (chosen)
 _SUFFIXES = (".csv", ".jsonl", ".ndjson", ".parquet")
 
 
@@ -40,7 +44,7 @@ def read_rows(path: Path) -> Iterator[Row]:
     kind = path.suffix.lower()
     if kind not in _SUFFIXES:
         raise UsageError(f"--batch {path}: expected a table ({', '.join(_SUFFIXES)})")
-    rows = {".csv": _csv_rows, ".parquet": read_parquet}.get(kind, _json_rows)(path)
+    rows: Iterator[Row] = {".csv": _csv_rows, ".parquet": read_parquet}.get(kind, _json_rows)(path)
     outputs: dict[str, int] = {}
     for number, row in enumerate(rows, start=1):
         if unknown := [name for name in row if name not in COLUMNS]:
@@ -48,23 +52,45 @@ def read_rows(path: Path) -> Iterator[Row]:
                 f"{path}: row {number}: unknown column {', '.join(map(repr, unknown))}; columns are {', '.join(COLUMNS)}"
             )
         output = str(row.get("output") or "").strip()
-        if output and outputs.setdefault(output, number) != number:
+        place = os.path.normcase(os.path.normpath(path.parent / output))
+        if output and outputs.setdefault(place, number) != number:
             raise UsageError(
-                f"{path}: row {number}: output {output!r} is that of row {outputs[output]} too: one plan would take the other's place"
+                f"{path}: row {number}: output {output!r} is that of row {outputs[place]} too: one plan would take the other's place"
             )
         yield row
 
 
 def _csv_rows(path: Path) -> Iterator[Row]:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.DictReader(file, restkey="more cells than columns", strict=True)
+    with path.open("rb") as head:
+        is_utf16 = head.read(2) in (
+            codecs.BOM_UTF16_LE,
+            codecs.BOM_UTF16_BE,
+        )  # a spreadsheet's "Unicode text"
+    with path.open(encoding="utf-16" if is_utf16 else "utf-8-sig", newline="") as file:
         try:
+            first = file.readline(_MOST_LINE)
+            file.seek(0)
+            reader = csv.DictReader(file, delimiter=max(",;\t", key=first.count), strict=True)
             names = [name.strip() for name in reader.fieldnames or ()]
+            if not names:
+                raise MissionFormatError(
+                    f"{path} is empty; the first line names the columns: {', '.join(COLUMNS)}", file=str(path)
+                )
             if twice := sorted({name for name in names if names.count(name) > 1}):
                 raise UsageError(f"{path}: column {twice[0]!r} is there twice")
             for row in reader:
-                yield {(name or "").strip(): value for name, value in row.items()}
-        except (csv.Error, UnicodeDecodeError) as error:
+                if None in row:
+                    raise MissionFormatError(
+                        f"{path}: line {reader.line_num}: more cells than the {len(names)} columns",
+                        file=str(path),
+                        line=reader.line_num,
+                    )
+                yield {name.strip(): value for name, value in row.items()}
+        except UnicodeError:
+            raise MissionFormatError(
+                f"{path} is not a text file; expected UTF-8", file=str(path), advice="save it as CSV in UTF-8"
+            ) from None
+        except csv.Error as error:
             raise MissionFormatError(f"{path}: line {reader.line_num}: {error}", file=str(path)) from None
 
 
@@ -131,7 +157,7 @@ def options_of(row: Row, options: PlanOptions, folder: Path) -> PlanOptions:
 
 
 def _text(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+    if isinstance(value, bool) or not isinstance(value, (str, int, float, Decimal)):
         raise UsageError("expected a text or a number")
     return str(value).strip()
 

@@ -20,6 +20,7 @@ from mavlink_bridge.cli.failing import (
     report,
     report_defect,
     report_error,
+    report_full_stdout,
     telling,
 )
 from mavlink_bridge.cli.terminal import say
@@ -48,7 +49,8 @@ def command_of(name: str) -> Callable[..., None]:
         except (mission_errors.MissionError, bridge_errors.BridgeError) as error:
             raise typer.Exit(report_error(name, error, wants_json=options.json_output)) from None
         except KeyboardInterrupt as interrupt:
-            message = str(interrupt) or "interrupted; the vehicle was left as it was"
+            left = "; the vehicle was left as it was" if getattr(options, "connect", None) else ""
+            message = str(interrupt) or f"interrupted{left}"
             details = getattr(interrupt, "details", None)
             report(
                 name, "Interrupted", message, ExitCode.INTERRUPTED, details, wants_json=options.json_output
@@ -59,6 +61,8 @@ def command_of(name: str) -> Callable[..., None]:
         except Exception as error:
             if is_reader_gone(error):
                 raise typer.Exit(drop_stdout()) from None
+            if (code := report_full_stdout(name, error)) is not None:
+                raise typer.Exit(code) from None
             if isinstance(error, OSError) and error.filename is not None:
                 message = f"{error.filename}: {error.strerror or error}"
                 report(name, "FileError", message, ExitCode.INPUT, wants_json=options.json_output)

@@ -21,6 +21,8 @@ from mavlink_bridge.protocol.verified_outcome import OutcomeKind
 from missions import errors as mission_errors
 
 _IS_WINDOWS = os.name == "nt"
+_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG, errno.EIO)
+"""Why what is open can be written no further."""
 
 
 class ExitCode(IntEnum):
@@ -219,6 +221,16 @@ def drop_stdout() -> int:
     """Let go of a standard output that nobody reads any more (``pbpp log … | head``); return the exit code, as a shell reports SIGPIPE."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 128 + 13
+
+
+def report_full_stdout(command: str, error: Exception) -> ExitCode | None:
+    """Report that the standard output cannot be written, as on a full disk; return the exit code, None where the error is another."""
+    if not isinstance(error, OSError) or error.filename is not None or error.errno not in _FULL:
+        return None
+    drop_stdout()
+    message = f"standard output cannot be written: {error.strerror}"
+    report(command, "FileError", message, ExitCode.INPUT, {"advice": "make room there"}, wants_json=False)
+    return ExitCode.INPUT
 
 
 def report_error(command: str, error: Exception, *, wants_json: bool) -> ExitCode:

@@ -14,6 +14,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import TextIO
 
 import typer
@@ -32,8 +33,12 @@ def echo(line: str, colour: str | None = None) -> None:
 
 
 def say(line: str, colour: str | None = None, *, nl: bool = True) -> None:
-    """Put a line on stderr, in colour if that is a terminal; without its end where an answer is to stand behind it."""
-    _put(line, colour, is_error=True, nl=nl)
+    """Put a line on stderr, in colour if that is a terminal; without its end where an answer is to stand behind it.
+
+    Where it cannot be written (a full disk, nobody who reads it) the line is lost, and the command goes on.
+    """
+    with suppress(OSError):
+        _put(line, colour, is_error=True, nl=nl)
 
 
 def echo_lines(lines: Iterable[str]) -> None:

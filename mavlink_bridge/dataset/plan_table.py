@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mavlink_bridge.dataset.schema import literal
 from mavlink_bridge.errors import UsageError
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def read_parquet(path: Path) -> Iterator[dict[str, Any]]:
     duckdb = _duckdb(path)
     with duckdb.connect(config={"memory_limit": _MEMORY}) as connection:
         try:
-            found = connection.execute("SELECT * FROM read_parquet($1)", [str(path)])
+            found = connection.execute("SELECT * FROM read_parquet($1)", [literal(path)])
             names = [column[0] for column in found.description]
             while rows := found.fetchmany(_ROWS):
                 for row in rows:
@@ -80,9 +81,7 @@ def write_parquet(lines: Path, path: Path) -> None:
     """
     duckdb = _duckdb(path)
     columns = ", ".join(f"{name}: '{kind}'" for name, kind in _COLUMNS.items())
-    query = (
-        f"SELECT * FROM read_json({_quoted(lines)}, format = 'newline_delimited', columns = {{{columns}}})"  # noqa: S608 - our own names
-    )
+    query = f"SELECT * FROM read_json({_quoted(literal(lines))}, format = 'newline_delimited', columns = {{{columns}}})"  # noqa: S608 - our own names
     with duckdb.connect(config={"memory_limit": _MEMORY, "preserve_insertion_order": True}) as connection:
         try:
             connection.execute(f"COPY ({query}) TO {_quoted(path)} (FORMAT parquet, COMPRESSION zstd)")
@@ -111,5 +110,5 @@ def _duckdb(path: Path) -> Any:  # noqa: ANN401 - a module without types
         ) from None
 
 
-def _quoted(path: Path) -> str:
+def _quoted(path: object) -> str:
     return "'" + str(path).replace("'", "''") + "'"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Final
+
+_PATTERN = re.compile(r"[\[*?]")
 
 SCHEMA_VERSION: Final = 1
 """Goes up when a column is renamed, removed or means something else; a dataset of another version is refused, not guessed at."""
@@ -433,3 +436,8 @@ FROM positions p LEFT JOIN vehicles v USING (log, month, vehicle) WHERE p.lat_de
     ),
 )
 """Views beside the tables."""
+
+
+def literal(path: object) -> str:
+    """Return a path as DuckDB reads just that file, and not those that it describes: brackets, stars and question marks are a pattern there."""
+    return _PATTERN.sub(r"[\g<0>]", str(path))

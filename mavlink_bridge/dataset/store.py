@@ -20,7 +20,7 @@ from typing import IO, TYPE_CHECKING, Any, Final
 import numpy as np
 
 from mavlink_bridge.backup.vehicle_lock import lock_file
-from mavlink_bridge.dataset.schema import PARTITION, SCHEMA_VERSION, TABLES, VIEWS
+from mavlink_bridge.dataset.schema import PARTITION, SCHEMA_VERSION, TABLES, VIEWS, literal
 from mavlink_bridge.errors import DatasetError
 from missions.formats.files import write_file
 
@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from mavlink_bridge.dataset.schema import Column, Table
 
 LIST_NAME: Final = "pbpp-dataset.json"
+_PARTITIONED: Final = tuple(f"{one.name}=" for one in PARTITION)
+"""How the names of a table's own folders begin."""
+
 _STAGING, _INCOMING, _SCRATCH, _LOCK = ".staging", ".incoming", ".scratch", ".lock"
 _MEMORY: Final = "160MB"
 """What DuckDB may hold; beyond, it writes to the scratch folder. Chosen: with the workers below 400 MB."""
@@ -87,6 +90,12 @@ class Dataset:
     """
 
     def __init__(self, folder: Path) -> None:
+        if named := [part for part in folder.parts if part.startswith(_PARTITIONED)]:
+            raise DatasetError(
+                f"{folder}: DuckDB takes a folder's name {named[0]!r} for the rows' own",
+                folder=str(folder),
+                advice="choose a folder with another name",
+            )
         self.folder = folder
         self._files: dict[str, list[str]] = {name: [] for name in TABLES}
         self._published: list[str] = []
@@ -153,7 +162,10 @@ class Dataset:
             found.execute(f"CREATE VIEW {table.name} AS {self.select(table)}")
         for view in VIEWS:
             found.execute(f"CREATE VIEW {view.name} AS {view.sql}")
-        found.execute(f"SET allowed_directories = [{quoted(self.folder)}]")
+        allowed = ", ".join(
+            quoted(one) for one in (self.folder, literal(self.folder))
+        )  # as it is, and as it is asked for
+        found.execute(f"SET allowed_directories = [{allowed}]")
         found.execute("SET enable_external_access = false")
         found.execute("SET lock_configuration = true")
         return found
@@ -301,7 +313,7 @@ class Dataset:
 
     def _moved(self, table: Table, path: Path) -> str:
         """Move a new file to its place; return its name there."""
-        partition = [part for part in path.parts if part.startswith(("month=", "vehicle="))]
+        partition = [part for part in path.parts if part.startswith(_PARTITIONED)]
         name = Path(table.name, *partition, f"part-{secrets.token_hex(8)}.parquet")
         to = self.folder / name
         to.parent.mkdir(parents=True, exist_ok=True)
@@ -354,7 +366,7 @@ def _is_ours(folder: Path) -> bool:
 
 def _parquet(files: Iterable[object], table: Table | None = None) -> str:
     """Return the reading of Parquet files; with a table, of those in its folders, whose names tell month and vehicle."""
-    names = ", ".join(map(quoted, files))
+    names = ", ".join(quoted(literal(file)) for file in files)
     if table is None or not table.is_partitioned:
         return f"read_parquet([{names}], hive_partitioning = false)"
     types = ", ".join(f"{quoted(one.name)}: {one.sql}" for one in PARTITION)

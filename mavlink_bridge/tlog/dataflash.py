@@ -18,7 +18,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.codec import Codec
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from pathlib import Path
 
     from mavlink_bridge.mavlink.messages import Message
@@ -54,11 +54,46 @@ _CODES = {
 
 _HUNDREDTHS = "cCeE"
 _TEXTS = "nNZ"
+_NUMBERS = "bBhHiIqQfdcCeELM"
+
+_NEEDED: dict[str, tuple[str, ...]] = {
+    "PARM": ("Name", "Value"),
+    "MODE": (),
+    "ARM": ("ArmState",),
+    "EV": ("Id",),
+    "MSG": ("Message",),
+    "GPS": ("Status", "Lat", "Lng"),
+    "POS": ("Lat", "Lng"),
+    "ATT": ("Yaw",),
+    "ORGN": ("Lat", "Lng"),
+    "CMD": ("CTot", "CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng"),
+    "MISE": ("CNum",),
+    "FNCE": ("Tot", "Seq", "Type", "Lat", "Lng", "Count", "Radius"),
+    "RALY": ("Tot", "Seq", "Lat", "Lng"),
+}
+"""Without which fields a message says nothing; its time is needed too."""
+
+_LETTERS: dict[str, str] = {
+    "TimeUS": "Q",
+    "GMS": "I",
+    **dict.fromkeys(("CTot", "CNum", "CId", "Tot", "Seq", "GWk"), "BH"),
+    **dict.fromkeys(("ArmState", "Id", "Status", "I", "Type", "Count", "Frame", "Mode", "ModeNum"), "BM"),
+    **dict.fromkeys(
+        ("Value", "Yaw", "Spd", "GCrs", "Alt", "Radius", "Prm1", "Prm2", "Prm3", "Prm4"), _NUMBERS
+    ),
+    **dict.fromkeys(("Lat", "Lng"), "L"),
+    **dict.fromkeys(("Name", "Message", "FWS"), _TEXTS),
+}
+"""As what a field is understood. A log declares its own formats, and a message that is laid out otherwise is passed over, whoever wrote it or whatever damaged
+it. So are the missions of ArduPilot 3.6: their places are 32-bit degrees, up to 0.8 m off."""
 
 _GPS_EPOCH_S, _WEEK_S = 315_964_800, 604_800  # 6 January 1980 in seconds since 1970, and a week
 _LEAP_S = 18  # between GPS time and UTC, since 2017
 _FIX_3D = 3  # GPS_FIX_TYPE_3D_FIX
 _BEAT_US = 1_000_000  # a vehicle sends a HEARTBEAT a second
+_MOST_US = 1 << 52  # 142 years after the boot: a damaged time
+_MOST_BYTES = 1 << 29
+"""Of telemetry that a log may become, which is held in memory (chosen): days of driving, and what unpacks to more is no log of a drive."""
 
 _STATION = (255, 190)  # who a list is told to: some ground station's
 _ARMED, _DISARMED = 10, 11  # EV.Id
@@ -82,8 +117,10 @@ class _Format:
     fields: struct.Struct
     letters: str
     labels: tuple[str, ...]
+    is_understood: bool
+    """Whether it has the fields that are looked at, each as what it is understood."""
 
-    def read(self, data: Any, at: int) -> dict[str, Any]:  # noqa: ANN401 - bytes or mapped memory
+    def read(self, data: bytes, at: int) -> dict[str, Any]:
         """Return the fields of a message by name."""
         values = self.fields.unpack_from(data, at + _LEAST_BYTES)
         return {
@@ -98,37 +135,40 @@ def _value(letter: str, value: Any) -> Any:  # noqa: ANN401 - as FMT says
     return value / 100 if letter in _HUNDREDTHS else value
 
 
-def messages_of(data: Any, wanted: frozenset[str]) -> Iterator[tuple[str, dict[str, Any]]]:  # noqa: ANN401 - as above
-    """Yield the wanted messages of a DataFlash log, by name; bytes that belong to none are skipped.
+def messages_of(pieces: Iterable[bytes], wanted: frozenset[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the wanted messages of a DataFlash log, by name; bytes that belong to none are skipped, and messages that are laid out as nobody expects.
 
     Parameters
     ----------
-    data : bytes or mapped memory
+    pieces : iterable of bytes
+        The log, in pieces of any size, of which one at a time is held.
     wanted : frozenset of str
         Names of messages.
     """
     formats: dict[int, _Format] = {}
-    at, end = 0, len(data)
-    while at + _LEAST_BYTES <= end:
-        kind = data[at + 2]
-        known = formats.get(kind)
-        if data[at : at + 2] != HEAD or (known is None and kind != _FMT):
-            following = data.find(HEAD, at + 1)
-            at = following if following >= 0 else end
-            continue
-        size = _LEAST_BYTES + _FMT_FIELDS.size if known is None or kind == _FMT else known.size
-        if at + size > end:
-            return
-        if kind == _FMT:
-            declared = _declared(data, at)
-            if declared is not None:
-                formats[declared[0]] = declared[1]
-        elif known is not None and known.name in wanted:
-            yield known.name, known.read(data, at)
-        at += size
+    data, at = b"", 0
+    for piece in pieces:
+        data, at = data[at:] + piece, 0
+        while at + _LEAST_BYTES <= len(data):
+            kind = data[at + 2]
+            known = formats.get(kind)
+            if data[at : at + 2] != HEAD or (known is None and kind != _FMT):
+                following = data.find(HEAD, at + 1)
+                at = following if following >= 0 else len(data) - 1  # whose last byte may begin a head
+                continue
+            size = _LEAST_BYTES + _FMT_FIELDS.size if known is None or kind == _FMT else known.size
+            if at + size > len(data):
+                break
+            if kind == _FMT:
+                declared = _declared(data, at)
+                if declared is not None:
+                    formats[declared[0]] = declared[1]
+            elif known is not None and known.name in wanted and known.is_understood:
+                yield known.name, known.read(data, at)
+            at += size
 
 
-def _declared(data: Any, at: int) -> tuple[int, _Format] | None:  # noqa: ANN401 - as above
+def _declared(data: bytes, at: int) -> tuple[int, _Format] | None:
     """Return the type and format that a FMT message declares; None where it makes no sense."""
     kind, size, *texts = _FMT_FIELDS.unpack_from(data, at + _LEAST_BYTES)
     name, letters, labels = (text.split(b"\0", 1)[0].decode("ascii", "replace") for text in texts)
@@ -138,42 +178,57 @@ def _declared(data: Any, at: int) -> tuple[int, _Format] | None:  # noqa: ANN401
     names = tuple(labels.split(",")) if labels else ()
     if fields.size + _LEAST_BYTES != size or len(names) != len(letters):
         return None
-    return kind, _Format(name, size, fields, letters, names)
+    is_understood = {"TimeUS", *_NEEDED[name]} <= set(names) if name in _NEEDED else True
+    is_understood &= all(
+        letter in _LETTERS.get(label, letter) for label, letter in zip(names, letters, strict=True)
+    )
+    return kind, _Format(name, size, fields, letters, names, is_understood)
 
 
-def as_telemetry(data: Any, path: Path) -> bytes:  # noqa: ANN401 - as above
+def as_telemetry(pieces: Callable[[], Iterable[bytes]], path: Path) -> bytes:
     """Return a DataFlash log as the bytes of a telemetry log.
 
     Parameters
     ----------
-    data : bytes or mapped memory
+    pieces : callable
+        Returns the log, piece by piece from its begin; it is gone through twice.
     path : Path
         For errors.
 
     Raises
     ------
     LogError
-        It does not say which vehicle it is of, or holds nothing that is looked at.
+        It does not say which vehicle it is of, holds nothing that is looked at, or too much.
     """
-    about = _About(data)
+    about = _About(pieces())
     if about.vehicle_type is None:
         raise LogError(
             f"{path}: a DataFlash log that does not say whose it is: no MSG or VER names ArduRover",
             path=str(path),
             advice="use the telemetry log (.tlog) that the ground station recorded",
         )
-    return _Translator(about).translated(data)
+    records, size = [], 0
+    for record in _Translator(about).translated(pieces()):
+        records.append(record)
+        size += len(record)
+        if size > _MOST_BYTES:
+            raise LogError(
+                f"{path}: a DataFlash log with more than {_MOST_BYTES >> 20} MB of positions, modes and lists",
+                path=str(path),
+                advice="use the telemetry log (.tlog) that the ground station recorded",
+            )
+    return b"".join(records)
 
 
 class _About:
     """What has to be known of a log before it is translated: whose it is, and when it begins."""
 
-    def __init__(self, data: Any) -> None:  # noqa: ANN401 - as above
+    def __init__(self, pieces: Iterable[bytes]) -> None:
         self.vehicle_type: int | None = None
         self.system = 1
         self.begins_us = 0
         is_boat = False
-        for name, fields in messages_of(data, frozenset({"MSG", "VER", "PARM", "GPS"})):
+        for name, fields in messages_of(pieces, frozenset({"MSG", "VER", "PARM", "GPS"})):
             if name == "PARM":
                 is_boat |= fields["Name"] == "FRAME_CLASS" and fields["Value"] == _BOAT_CLASS
                 if fields["Name"] in _SYSTEM_NAMES and 1 <= fields["Value"] <= 255:
@@ -191,9 +246,9 @@ class _About:
     def _take_time(self, gps: dict[str, Any]) -> None:
         """Take when the vehicle booted, from the first GPS message with a fix and a date."""
         week = gps.get("GWk", 0)
-        if not self.begins_us and week and gps.get("Status", 0) >= _FIX_3D:
-            gps_s = _GPS_EPOCH_S + week * _WEEK_S + gps["GMS"] / 1000 - _LEAP_S
-            self.begins_us = round(gps_s * 1e6) - gps["TimeUS"]
+        if not self.begins_us and week and gps["Status"] >= _FIX_3D:
+            gps_s = _GPS_EPOCH_S + week * _WEEK_S + gps.get("GMS", 0) / 1000 - _LEAP_S
+            self.begins_us = max(0, round(gps_s * 1e6) - gps["TimeUS"])
 
 
 class _Translator:
@@ -227,14 +282,17 @@ class _Translator:
             "RALY": self._rally,
         }
 
-    def translated(self, data: Any) -> bytes:  # noqa: ANN401 - as above
-        """Return the bytes of a telemetry log."""
-        for name, fields in messages_of(data, frozenset(self._takers)):
-            self._now_us = int(fields.get("TimeUS", self._now_us))
-            if self._beaten_us is None or self._now_us - self._beaten_us >= _BEAT_US:
+    def translated(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
+        """Yield the records of a telemetry log."""
+        for name, fields in messages_of(pieces, frozenset(self._takers)):
+            if fields["TimeUS"] > _MOST_US:
+                continue
+            self._now_us = fields["TimeUS"]
+            if self._beaten_us is None or not 0 <= self._now_us - self._beaten_us < _BEAT_US:
                 self._beat()
             self._takers[name](fields)
-        return b"".join(self._records)
+            yield from self._records
+            self._records.clear()
 
     def _tell(self, message: Message) -> None:
         time_us = (self._about.begins_us + self._now_us) & ~3  # whose low bits are a link's number
@@ -272,11 +330,12 @@ class _Translator:
     def _gps(self, fields: dict[str, Any]) -> None:
         if fields.get("I", 0):  # the second receiver
             return
-        status, course_rad = int(fields["Status"]), math.radians(fields.get("GCrs", 0.0))
+        status, course_rad = fields["Status"], math.radians(fields.get("GCrs", 0.0))
         speed_mps = fields.get("Spd", 0.0)
-        self._velocity_mps = (speed_mps * math.cos(course_rad), speed_mps * math.sin(course_rad))
+        if math.isfinite(speed_mps) and math.isfinite(course_rad):
+            self._velocity_mps = (speed_mps * math.cos(course_rad), speed_mps * math.sin(course_rad))
         lat, lon = (fields["Lat"], fields["Lng"]) if status >= _FIX_3D else (0, 0)
-        self._tell(m.GpsRawInt(max(0, self._now_us), status, fields["Lat"], fields["Lng"], 0))
+        self._tell(m.GpsRawInt(self._now_us, status, fields["Lat"], fields["Lng"], 0))
         if not self._has_pos:
             self._place(lat, lon)
 
@@ -291,7 +350,8 @@ class _Translator:
         self._tell(m.GlobalPositionInt(boot_ms, lat, lon, 0, 0, north, east, 0, heading))
 
     def _attitude(self, fields: dict[str, Any]) -> None:
-        self._yaw_deg = float(fields["Yaw"])
+        if math.isfinite(fields["Yaw"]):
+            self._yaw_deg = float(fields["Yaw"])
 
     def _origin(self, fields: dict[str, Any]) -> None:
         if fields.get("Type") == 1:  # home; 0 is the estimator's origin

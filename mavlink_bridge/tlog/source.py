@@ -53,16 +53,16 @@ class LogFile:
             raise LogError(f"{path}: the file is empty", path=str(path))
         self._is_gzip = _unpacks(head)
         begin = zlib.decompressobj(wbits=_GZIP).decompress(head, len(HEAD)) if self._is_gzip else head
-        self._telemetry = self._translated() if begin.startswith(HEAD) else None
+        self._telemetry = as_telemetry(self._pieces, path) if begin.startswith(HEAD) else None
 
-    def _translated(self) -> bytes:
-        """Return a DataFlash log as telemetry; it is all that of it is kept."""
+    def _pieces(self) -> Iterator[bytes]:
+        """Yield the log as it is unpacked, piece by piece."""
         with self._opened() as file:
-            if not self._is_gzip:
-                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as mapped:
-                    return as_telemetry(mapped, self.path)
-        with self._opened() as file, _GzipSource(file) as source:
-            return as_telemetry(b"".join(source.pieces()), self.path)
+            if self._is_gzip:
+                yield from _GzipSource(file).pieces()
+            else:
+                while piece := file.read(WINDOW_BYTES):
+                    yield piece
 
     def open(self) -> AbstractContextManager[Source]:
         """Open the log from its begin."""

@@ -44,6 +44,9 @@ _SAME_ZONE = 0.2
 _ROUNDED_M = 0.02
 """Positions nearer than this are the same: formats round to degE7 or to some more digits, which is 11 mm."""
 
+_SINGLE = 2.0**-23
+"""Between neighbours of the 32-bit numbers that vehicles keep, as a share of them."""
+
 _PARAMS: dict[tuple[int, int], str] = {
     (Command.NAV_WAYPOINT, 1): "stop (s)",
     (Command.NAV_LOITER_TIME, 1): "time (s)",
@@ -235,8 +238,10 @@ def _of_params(a: MissionItem, b: MissionItem, same_place: dict[int, int]) -> li
 
 
 def _are_close(a: float, b: float) -> bool:
-    """Return whether two numbers are the same, as files write them; or neither is set."""
-    return math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-6) or (math.isnan(a) and math.isnan(b))
+    """Return whether two numbers are the same, as files write them; or neither is set. Whole ones are numbers of something: any other is another."""
+    if a.is_integer() and b.is_integer():
+        return a == b
+    return math.isclose(a, b, rel_tol=_SINGLE, abs_tol=1e-6) or (math.isnan(a) and math.isnan(b))
 
 
 def _places(item: MissionItem | None) -> tuple[LatLon, ...]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-import string
+import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from missions.checking.findings import RULES, Rule
+from missions.words import harmless
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from pathlib import PurePath
 
     from missions.checking.findings import Finding, Report
 
@@ -47,11 +50,11 @@ def _result(file: str, finding: Finding) -> dict[str, Any]:
         "ruleId": finding.rule,
         "ruleIndex": list(Rule).index(finding.rule),
         "level": "error" if finding.fails else "warning",
-        "message": {"text": finding.message},
+        "message": {"text": harmless(finding.message)},
         "locations": [
             {
                 "physicalLocation": {
-                    "artifactLocation": {"uri": uri_of(file)},
+                    "artifactLocation": {"uri": uri_of(Path(file))},
                     "region": {"startLine": finding.line},
                 },
                 **({"logicalLocations": [{"name": finding.case, "kind": "leg"}]} if finding.case else {}),
@@ -60,10 +63,8 @@ def _result(file: str, finding: Finding) -> dict[str, Any]:
     }
 
 
-def uri_of(file: str) -> str:
-    """Return a file's name as a URI: relative as it is, absolute as ``file:``."""
-    path = quote(file.replace("\\", "/"), safe="/:" if file[1:2] == ":" else "/")
-    if path[:1] == "/":
-        return f"file://{path}"
-    is_drive = file[1:2] == ":" and file[0] in string.ascii_letters
-    return f"file:///{path}" if is_drive else path
+def uri_of(path: PurePath) -> str:
+    """Return a file's name as a URI: relative as it is, absolute as ``file:``; bytes of a name that are no UTF-8 as they are on the disk."""
+    if path.is_absolute():
+        return path.as_uri()
+    return quote(os.fsencode(path.as_posix()))  # a colon too: what stands before one would pass for a scheme

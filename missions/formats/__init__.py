@@ -327,6 +327,11 @@ def format_of(path: Path, verb: str = "read", part: Part | None = None) -> Forma
     MissionFormatError
         It has none.
     """
+    if str(path) == "-":
+        stream = "standard input is not read" if verb == "read" else "standard output is not written"
+        raise MissionFormatError(
+            f"-: {stream}", file="-", advice="give a file, whose extension sets the format"
+        )
     found = FORMATS.get(path.suffix.lower())
     foreign = kind_of_suffix(path.suffix) if verb == "read" and found is None else None
     if foreign is not None:

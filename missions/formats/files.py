@@ -21,6 +21,15 @@ Writer: TypeAlias = "Callable[[Path, bytes], None]"
 """What puts bytes into a file: `write_file`, or what looks first at the file that is there."""
 
 
+_ADVICE = {
+    errno.EISDIR: "choose another name",
+    errno.EINVAL: "choose another name",
+    errno.ENOSPC: "make room on the disk, or choose another folder",
+    errno.ENOENT: "create the folder first, or choose another one",
+}
+"""What helps where the folder is not to blame, by the error's number."""
+
+
 def write_file(path: Path, data: bytes, make_way: Callable[[], object] = lambda: None) -> None:
     """Write a whole file or nothing: what was there before is replaced when all of the new is on the disk.
 
@@ -149,5 +158,5 @@ def unwritable(path: Path, error: OSError) -> MissionFormatError:
     return MissionFormatError(
         f"{path} cannot be written: {error.strerror}",
         file=str(path),
-        advice="choose another folder, or make this one writable",
+        advice=_ADVICE.get(error.errno or 0, "choose another folder, or make this one writable"),
     )

@@ -40,7 +40,8 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
         for track in root.all("trk")
         for segment in track.all("trkseg")
     ]
-    drawn = [feature for feature in (*routes, *tracks) if feature.lines[0]]
+    drawn = [route for route in routes if route.lines[0]]
+    drawn += [track for track in tracks if len(track.lines[0]) > 1]  # receivers write tracks of one position
     points = [_way_point(element) for element in root.all("wpt")]
     places = [point for point in points if name_key(point.names[0]) != Role.HOME]
     remarks: tuple[str, ...] = ()
@@ -57,8 +58,6 @@ def read(text: str, source: str, choices: Choices = NO_CHOICES) -> Situation:
 
 def _line(element: Element, named: Element, point: str, shape: Shape) -> Feature:
     places = tuple(map(_position, element.all(point)))
-    if len(places) == 1:
-        raise element.error("1 position; expected at least 2")
     return Feature(shape, (places,), {}, (named.text_of("name"),), element.where)
 
 

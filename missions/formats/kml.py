@@ -110,7 +110,9 @@ def _shapes(element: Element) -> Iterator[tuple[Shape, tuple[tuple[LatLon, ...],
             raise child.error(f"a Model is not supported; expected one of {', '.join(_SHAPES)}")
         if child.name in _TRACKS:
             for track in (child, *child.all("Track")):
-                positions = tuple(_track_position(coord) for coord in track.all("coord"))
+                positions = tuple(
+                    _track_position(coord) for coord in track.all("coord") if coord.text.strip()
+                )  # an empty one: nothing was known then
                 if len(positions) > 1:
                     yield Shape.TRACK, (positions,), track.where
         elif child.name == "MultiGeometry":

@@ -195,6 +195,8 @@ def _jump_by_seq(node: JsonNode, item: MissionItem, seq_of_id: dict[int, int | N
 
 def _item(node: JsonNode) -> MissionItem:
     params = node["params"].members()
+    if "coordinate" in node:  # as QGroundControl wrote items in 2016 and still reads them
+        params += node["coordinate"].members()
     if len(params) != 7:
         raise node["params"].error(f"{len(params)} params; expected 7")
     values = [math.nan if param.value is None else param.number() for param in params]

@@ -180,3 +180,61 @@ def test_a_windows_path_in_the_options_says_how_to_write_it(tmp_path, path):
     options.write_text(f"[all]\nsigning-key = '{path}'\n", encoding="utf-8")
     told = CliRunner().invoke(app, ["config", "--config", str(options), "--json"])
     assert {one["value"] for one in json.loads(told.stdout)["settings"]} == {path}
+
+
+def pbpp_in_shell(words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        f"{sys.executable} -m mavlink_bridge.cli {words}",
+        shell=True,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is full by itself")
+def test_where_results_cannot_be_told_that_is_the_error(tmp_path):
+    (tmp_path / "a.waypoints").write_text(ONE)
+    (tmp_path / "b.waypoints").write_text(ONE.replace("464", "465"))
+    for words in ("", "--json"):
+        full = pbpp_in_shell(f"diff a.waypoints b.waypoints {words} > /dev/full", tmp_path)
+        assert (full.returncode, full.stderr.splitlines()) == (
+            3,
+            ["error: standard output cannot be written: No space left on device", "advice: make room there"],
+        )
+    silent = pbpp_in_shell("convert a.waypoints none/a.plan 2> /dev/full", tmp_path)
+    assert silent.returncode == 3
+    closed = pbpp_in_shell("diff a.waypoints b.waypoints >&- 2>&-", tmp_path)
+    assert closed.returncode == 8
+
+
+ONE = (
+    "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t40.071374\t-105.229930\t0\t1\n"
+    "1\t0\t3\t16\t0\t0\t0\t0\t40.071464\t-105.22996\t0\t1\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "error", "advice"),
+    [
+        (("convert", "-", "a.plan"), "-: standard input is not read", "give a file, whose extension sets the format"),
+        (("convert", "a.waypoints", "-"), "-: standard output is not written", "give a file, whose extension sets the format"),
+        (("convert", "a.waypoints", "f.plan"), "f.plan cannot be written: Is a directory", "choose another name"),
+        (
+            ("convert", "a.waypoints", "none/a.plan"),
+            "none/a.plan cannot be written: No such file or directory",
+            "create the folder first, or choose another one",
+        ),
+    ],
+)  # fmt: skip
+@pytest.mark.skipif(os.name == "nt", reason="the system words it otherwise")
+def test_what_cannot_be_read_or_written_gets_advice_that_fits(tmp_path, monkeypatch, words, error, advice):
+    monkeypatch.chdir(tmp_path)
+    Path("a.waypoints").write_text(ONE)
+    Path("f.plan").mkdir()
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 3
+    assert error in result.stderr
+    assert f"advice: {advice}\n" in result.stderr

@@ -123,8 +123,11 @@ def test_json_lines_and_parquet_say_the_same(table):
         ("a.csv", "fence,clearence\nx,2\n", "unknown column 'clearence'"),
         ("a.csv", "fence,start, start\nx,2,3\n", "column 'start' is there twice"),
         ("a.jsonl", '{"start": "1,2", "start": "3,4"}\n', "a key is there twice"),
-        ("a.csv", "fence\nx,2\n", "more cells than columns"),
-        ("a.csv", b"fence\n\xff\n", "a.csv: line"),
+        ("a.csv", "fence\nx,2\n", "a.csv: line 2: more cells than the 1 columns"),
+        ("a.csv", b"fence\n\xff\n", "a.csv is not a text file; expected UTF-8"),
+        ("a.csv", "fence\n".encode("utf-16-le"), "unknown column"),
+        ("a.csv", "", "a.csv is empty; the first line names the columns"),
+        ("a.csv", "\ufeff", "a.csv is empty; the first line names the columns"),
         ("a.csv", 'fence\n"x\n', "a.csv: line"),
         ("a.jsonl", "{", "line 1: not JSON"),
         ("a.jsonl", "\n[1]", "line 2: expected an object"),
@@ -204,3 +207,44 @@ def test_no_plan_takes_anothers_place(tmp_path):
     assert [next(rows)["fence"] for _ in range(3)] == ["a", "b", "c"]
     with pytest.raises(UsageError, match=r"row 4: output 'one.waypoints' is that of row 1 too"):
         next(rows)
+    for spelt in (
+        "./one.waypoints",
+        "sub/../one.waypoints",
+        " one.waypoints",
+        str(tmp_path / "one.waypoints"),
+    ):
+        table.write_text(f"fence,output\na,one.waypoints\nb,{spelt}\n")
+        with pytest.raises(UsageError, match=r"row 2: output '.*one.waypoints' is that of row 1 too"):
+            list(read_rows(table))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("between", [",", ";", "\t"])
+def test_tables_as_spreadsheets_write_them(tmp_path, between, encoding):
+    path = tmp_path / "a.csv"
+    with path.open("w", newline="", encoding=encoding) as file:
+        writer = csv.writer(file, delimiter=between)
+        writer.writerows([["name", "fence", "start"], ["Bär", "a.plan", HOME], ["q", 'a"b', "1;2"]])
+    assert list(read_rows(path)) == [
+        {"name": "Bär", "fence": "a.plan", "start": HOME},
+        {"name": "q", "fence": 'a"b', "start": "1;2"},
+    ]
+
+
+def test_a_parquet_file_is_read_by_its_own_name(tmp_path):
+    """To DuckDB brackets, stars and question marks are a pattern: it would read other files."""
+    for name in ("g[1].parquet", "g1.parquet", "h?.parquet", "hh.parquet", "*.parquet"):
+        duckdb.sql(
+            f"COPY (SELECT '{name}' AS name, 1.5 AS clearance) TO '{tmp_path}/{name}' (FORMAT parquet)"
+        )
+    for path in tmp_path.iterdir():
+        assert [row["name"] for row in read_rows(path)] == [path.name]
+
+
+def test_decimal_numbers_of_a_database_are_numbers(table):
+    duckdb.sql(
+        "COPY (SELECT 'fence.waypoints' AS fence, 'rover.parm' AS vehicle, [40.071374, -105.229930] AS start, "
+        "[[40.07228, -105.22907]] AS target, 0.5 AS clearance) TO 'field/a.parquet' (FORMAT parquet)"
+    )
+    (row,) = told(run("field/a.parquet", "--jobs", "1").stdout)
+    assert (row["status"], row["clearance_m"]) == ("ok", 0.5)

@@ -510,8 +510,8 @@ def check_lines(stderr: str) -> str:
     ("arguments", "advice"),
     [
         ((*FROM_TO, "-o", "missing/mission.plan"), "create missing first, or choose another folder"),
-        ((*FROM_TO, "-o", "folder.plan"), "choose another folder, or make this one writable"),
-        ((*FROM_TO, "--plot", "folder.png"), "choose another folder, or make this one writable"),
+        ((*FROM_TO, "-o", "folder.plan"), "choose another name"),
+        ((*FROM_TO, "--plot", "folder.png"), "choose another name"),
     ],
 )
 def test_nobody_is_told_to_mend_a_file_that_could_not_be_written(arguments, advice):

@@ -358,3 +358,20 @@ def test_two_builds_at_once_do_not_mix(tmp_path, logs):
             second, log_files([logs / "mission-yard.tlog"]), workers
         )  # knows of the rows added since it was opened
     assert (found.known, found.read) == (1, 0)
+
+
+@pytest.mark.parametrize("name", ["vehicle=9", "month=2020-01"])
+def test_a_folder_that_would_pass_for_a_column_is_refused(tmp_path, name):
+    """DuckDB takes values from the names of all folders above a file: each row's vehicle would be 9."""
+    with pytest.raises(DatasetError, match=f"takes a folder's name '{name}' for the rows' own"):
+        Dataset(tmp_path / name / "fleet")
+
+
+def test_a_dataset_is_read_by_its_own_name(place, tmp_path):
+    """To DuckDB brackets are a pattern: beside a copy it would read that one."""
+    odd = tmp_path / "fleet[1]"
+    shutil.copytree(place / "dataset", odd)
+    shutil.copytree(place / "dataset", tmp_path / "fleet1")
+    for path in (tmp_path / "fleet1").rglob("*.parquet"):
+        path.write_bytes(b"")
+    assert every_row(odd) == every_row(place / "dataset")

@@ -1,4 +1,4 @@
-"""DataFlash logs, made by a writer of our own and read a second time by pymavlink's reader; no log of a real board was at hand."""
+"""DataFlash logs, made by a writer of our own and read a second time by pymavlink's reader; no log of a real rover was at hand."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import gzip
 import itertools
 import math
 import random
+import struct
+import tracemalloc
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,8 +16,9 @@ from tlog.dataflash_writer import FORMATS, declarations, message
 
 from mavlink_bridge.errors import LogError
 from mavlink_bridge.logbook import read_logbook
+from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.tlog import TlogReader
-from mavlink_bridge.tlog.dataflash import messages_of
+from mavlink_bridge.tlog.dataflash import as_telemetry, messages_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,7 +103,7 @@ def log(tmp_path) -> Path:
 def test_the_messages_are_those_that_pymavlink_reads(log):
     wanted = frozenset(set(FORMATS) - {"RALY"})
     theirs = DFReader_binary(str(log))
-    for name, fields in messages_of(log.read_bytes(), wanted):
+    for name, fields in messages_of([log.read_bytes()], wanted):
         other = theirs.recv_match(type=list(wanted))
         assert other.get_type() == name
         told = other.to_dict()
@@ -165,15 +168,116 @@ def test_a_log_that_does_not_say_whose_it_is_is_refused(tmp_path):
 
 def test_damage_costs_what_it_hits(log):
     data = drive()
-    whole = list(messages_of(data, frozenset({"POS"})))
+    whole = list(messages_of([data], frozenset({"POS"})))
     rng = random.Random(3)
     for _ in range(60):
         at = rng.randrange(len(declarations()), len(data) - 200)
         cut = data[:at] + rng.randbytes(rng.randrange(80)) + data[at + rng.randrange(1, 150) :]
-        found = list(messages_of(cut, frozenset({"POS"})))
+        found = list(messages_of([cut], frozenset({"POS"})))
         assert len(whole) - 8 <= len(found) <= len(whole) + 3
     for size in range(0, 2000, 37):
-        list(messages_of(data[:size], frozenset({"POS"})))
+        list(messages_of([data[:size]], frozenset({"POS"})))
+
+
+def test_the_size_of_pieces_changes_nothing(log):
+    data = drive()[: len(declarations()) + 20_000] + b"\xa3" + drive()[-3000:]
+    wanted = frozenset({"GPS", "POS", "CMD", "MSG"})
+    whole = list(messages_of([data], wanted))
+    for size in (1, 2, 3, 88, 89, 90, 1009):
+        pieces = (data[begin : begin + size] for begin in range(0, len(data), size))
+        assert list(messages_of(pieces, wanted)) == whole
+
+
+def test_whatever_is_damaged_a_log_is_read_or_refused(log, tmp_path):
+    """Bytes are changed everywhere, also where the log declares how its messages are laid out: no checksum would tell."""
+    data, path = drive(), tmp_path / "damaged.bin"
+    rng = random.Random(11)
+    declared = len(declarations())
+    for _ in range(100):
+        damaged = bytearray(data[: declared + 10_000])
+        for _ in range(rng.choice((1, 20, 300))):
+            damaged[rng.randrange(declared if rng.random() < 0.5 else len(damaged))] = rng.choice(
+                (rng.randrange(256), 0xFF, 0x7F, *b"fdQHBLZ")
+            )
+        path.write_bytes(damaged)
+        try:
+            frames = [entry.frame for entry in TlogReader(path)]
+        except LogError:
+            continue
+        assert frames
+
+
+@pytest.mark.parametrize(
+    "value", [math.nan, math.inf, -math.inf, 3e38], ids=["nan", "inf", "minus inf", "huge"]
+)
+def test_numbers_that_are_none(tmp_path, value):
+    path = tmp_path / "odd.bin"
+    path.write_bytes(
+        declarations()
+        + message("MSG", 1_000_000, "ArduRover V4.6.3")
+        + message("PARM", 1_000_000, "WP_SPEED", value, 0.0)
+        + message("GPS", 2_000_000, 0, 6, MS, WEEK, 20, 0.7, *HOME, value, value, value, value)
+        + message("POS", 2_000_000, *HOME, value, value, value)
+    )
+    placed = [
+        entry.frame.message
+        for entry in TlogReader(path)
+        if entry.frame and isinstance(entry.frame.message, m.GlobalPositionInt)
+    ]
+    assert [(one.lat, one.lon) for one in placed] == [HOME, HOME]
+
+
+def test_a_damaged_time_ends_no_heartbeats(tmp_path):
+    path = tmp_path / "time.bin"
+    times_us = [1_000_000, 1 << 63, 9_000_000_000, 2_000_000, 3_500_000]
+    path.write_bytes(
+        declarations()
+        + message("MSG", 1_000_000, "ArduRover V4.6.3")
+        + b"".join(message("POS", time_us, *HOME, 0.0, 0.0, 0.0) for time_us in times_us)
+    )
+    found = [entry.frame.message for entry in TlogReader(path) if entry.frame]
+    assert sum(isinstance(one, m.GlobalPositionInt) for one in found) == 4  # not that of 292,000 years
+    assert sum(isinstance(one, m.Heartbeat) for one in found) == 4
+
+
+def test_missions_whose_places_are_rounded_are_passed_over(tmp_path):
+    """ArduPilot 3.6 wrote them as floats; a mission that is up to 0.8 m off must pass for none."""
+    letters, labels = b"QHHHfffffffB", b"TimeUS,CTot,CNum,CId,Prm1,Prm2,Prm3,Prm4,Lat,Lng,Alt,Frame"
+    layout = struct.Struct("<QHHHfffffffB")
+    path = tmp_path / "v3.6.bin"
+    path.write_bytes(
+        declarations()
+        + b"\xa3\x95\x80"
+        + struct.pack("<BB4s16s64s", 40, 3 + layout.size, b"CMD", letters, labels)
+        + message("MSG", 1_000_000, "ArduRover V3.6.4")
+        + b"\xa3\x95\x28"
+        + layout.pack(2_000_000, 1, 0, 16, 0, 0, 0, 0, 47.3977420, 8.5455940, 0, 0)
+        + message("POS", 2_000_000, *HOME, 0.0, 0.0, 0.0)
+    )
+    (vehicle,) = read_logbook(path).vehicles
+    assert vehicle.situation.mission is None
+    assert vehicle.positions == 1
+
+
+def test_a_bomb_is_refused_in_little_memory(monkeypatch, tmp_path):
+    monkeypatch.setattr("mavlink_bridge.tlog.dataflash._MOST_BYTES", 100_000)
+    begin = declarations() + message("MSG", 1_000_000, "ArduRover V4.6.3")
+    position = message("POS", 2_000_000, *HOME, 0.0, 0.0, 0.0)
+    with pytest.raises(LogError, match="more than 0 MB of positions"):
+        as_telemetry(
+            lambda: itertools.chain([begin], itertools.repeat(position, 5000)), tmp_path / "endless.bin"
+        )
+    zeros = tmp_path / "zeros.bin"
+    with gzip.open(zeros, "wb", 9) as file:
+        file.write(b"\xa3\x95")
+        for _ in range(40):
+            file.write(bytes(1 << 20))
+    tracemalloc.start()
+    with pytest.raises(LogError, match="no MSG or VER names ArduRover"):
+        TlogReader(zeros)
+    _, most_bytes = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most_bytes < 20e6
 
 
 @pytest.mark.parametrize(

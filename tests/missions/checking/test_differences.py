@@ -20,6 +20,7 @@ from missions.rally import RallyPoint
 from missions.situation import Known, Mission, Situation
 
 HOME = LatLon(48.1, 11.5)
+NAV_SCRIPT_TIME = 42702
 PARTS = (Part.MISSION, Part.FENCE, Part.RALLY)
 GEOD = Geod(ellps="WGS84")
 
@@ -30,6 +31,26 @@ def place(east: int, north: int) -> LatLon:
 
 def jump(item: int, times: float = 2.0) -> MissionItem:
     return MissionItem(Command.DO_JUMP, CoordinateFrame.MISSION, (float(item), times, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_same"),
+    [
+        (3_000_000.0, 3_000_001.0, False),  # a number of something, such as a script's argument
+        (16_777_215.0, 16_777_216.0, False),
+        (0.1, 0.10000000149011612, True),  # as a vehicle keeps it
+        (123_456.1, 123_456.1015625, True),
+        (123_456.1, 123_456.2, False),
+        (0.0, 1e-7, True),
+        (2.0, 2.0000001, True),
+    ],
+)
+def test_numbers_are_the_same_as_far_as_vehicles_keep_them(one, other, is_same):
+    a, b = (
+        situation([MissionItem(NAV_SCRIPT_TIME, CoordinateFrame.MISSION, (1.0, 2.0, value, 0.0))])
+        for value in (one, other)
+    )
+    assert (differences(a, b, PARTS) == ()) == is_same
 
 
 def square(east: int, north: int, size: int = 10, kind: ZoneKind = ZoneKind.EXCLUSION) -> PolygonZone:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+import os
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from urllib.parse import unquote
 from xml.etree import ElementTree as ET
 
@@ -16,6 +17,7 @@ from missions.checking.findings import RULES, Finding, Report, Rule, report_of_e
 from missions.checking.junit import junit_lines
 from missions.checking.sarif import sarif_lines, uri_of
 from missions.errors import MissionFormatError
+from missions.words import harmless
 
 SCHEMA = json.loads((Path(__file__).parent / "data" / "sarif-2.1.0-rtm.5.json").read_text(encoding="utf-8"))
 VALID = jsonschema.Draft4Validator(SCHEMA, format_checker=jsonschema.FormatChecker())
@@ -46,7 +48,7 @@ def test_every_log_is_valid_sarif(many):
     VALID.validate(log)
     run = log["runs"][0]
     told = [finding for report in many for finding in report.findings]
-    assert [result["message"]["text"] for result in run["results"]] == [one.message for one in told]
+    assert [result["message"]["text"] for result in run["results"]] == [harmless(one.message) for one in told]
     rules = run["tool"]["driver"]["rules"]
     assert [rule["id"] for rule in rules] == list(Rule) == list(RULES)
     for result, finding in zip(run["results"], told, strict=True):
@@ -71,17 +73,37 @@ def test_every_junit_report_is_xml_that_counts_right(many):
 
 
 @pytest.mark.parametrize(
-    ("name", "uri"),
+    ("path", "uri"),
     [
-        ("missions/a b.plan", "missions/a%20b.plan"),
-        ("/home/me/a.plan", "file:///home/me/a.plan"),
-        ("C:\\me\\a.plan", "file:///C:/me/a.plan"),
-        ("ä:b.plan", "%C3%A4:b.plan"),
+        (PurePosixPath("missions/a b.plan"), "missions/a%20b.plan"),
+        (PurePosixPath("/home/me/a.plan"), "file:///home/me/a.plan"),
+        (PureWindowsPath("C:\\me\\a.plan"), "file:///C:/me/a.plan"),
+        (PureWindowsPath("me\\a.plan"), "me/a.plan"),
+        (PurePosixPath("me\\a.plan"), "me%5Ca.plan"),  # where a backslash is a letter
+        (PurePosixPath("ä:b.plan"), "%C3%A4%3Ab.plan"),
+        (PurePosixPath("C:b.plan"), "C%3Ab.plan"),
+        (PurePosixPath("50%#1?.plan"), "50%25%231%3F.plan"),
     ],
 )
-def test_files_are_named_as_uris(name, uri):
-    assert uri_of(name) == uri
-    assert unquote(uri).endswith(name.replace("\\", "/"))
+def test_files_are_named_as_uris(path, uri):
+    assert uri_of(path) == uri
+    assert unquote(uri).endswith(path.as_posix())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names on Windows are Unicode")
+def test_names_that_are_no_text_are_reported():
+    for folder in ("", "/home/"):
+        name = folder + os.fsdecode(b"\xff\x1b[31m.plan")
+        report = report_of_error(name, f"{name} cannot be read", MissionFormatError("", file=name))
+        log = json.loads("".join(sarif_lines([report], "1")))
+        VALID.validate(log)
+        (result,) = log["runs"][0]["results"]
+        assert result["message"][
+            "text"
+        ].encode()  # no half of a character, which other readers of JSON refuse
+        uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+        assert uri.endswith("%FF%1B%5B31m.plan")
+        assert ET.fromstring("\n".join(junit_lines([report])))[0].get("errors") == "1"
 
 
 def test_an_error_stands_on_the_line_that_it_names_in_this_file():

@@ -360,3 +360,24 @@ def test_what_is_no_autopilot_or_vehicle_is_refused(key: str, value: Any) -> Non
 )
 def test_a_plan_is_written_for_the_vehicle(situation: Situation, firmware: int) -> None:
     assert json.loads(qgc_plan.write(situation))["mission"]["firmwareType"] == firmware
+
+
+def test_items_as_qgroundcontrol_wrote_them_in_2016_are_read_as_it_reads_them():
+    """Its place stands beside four parameters (`MissionItem::_convertJsonV2ToV3`)."""
+    plan = copy.deepcopy(PLAN)
+    plan["mission"]["items"] = [
+        {
+            "type": "SimpleItem",
+            "autoContinue": True,
+            "command": 16,
+            "frame": 3,
+            "params": [1, 0, 0, None],
+            "coordinate": [47.5, -122.25, 20],
+        }
+    ]
+    (item,) = qgc_plan.read(json.dumps(plan), "f").mission.value.items
+    assert (item.lat_e7, item.lon_e7, item.alt_m, item.params[0]) == (475_000_000, -1_222_500_000, 20.0, 1.0)
+    assert math.isnan(item.params[3])
+    plan["mission"]["items"][0]["coordinate"] = [47.5, -122.25]
+    with pytest.raises(MissionFormatError, match="6 params; expected 7"):
+        qgc_plan.read(json.dumps(plan), "f")

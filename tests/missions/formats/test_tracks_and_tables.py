@@ -22,7 +22,16 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box, union_all
 
 from missions.errors import MissionFormatError
 from missions.fence import CircleZone, PolygonZone, ZoneKind
-from missions.formats import Choices, geojson, gpx, read_mission, read_situation, waypoints, write_situation
+from missions.formats import (
+    Choices,
+    geojson,
+    gpx,
+    kml,
+    read_mission,
+    read_situation,
+    waypoints,
+    write_situation,
+)
 from missions.formats.features import Role
 from missions.geo import LatLon
 from missions.items import Command, MissionItem, waypoint
@@ -53,6 +62,27 @@ def test_the_one_route_of_a_gpx_file_is_the_mission():
     assert places_of(situation) == [A, B]
     assert situation.home.value == C
     assert situation.remarks == ()
+
+
+def test_a_route_of_one_waypoint_is_read_as_it_is_written():
+    one = Situation(mission=Known(Mission((waypoint(A),), C), None, "f"))
+    found = gpx.read(gpx.write(one), "f")
+    assert (places_of(found), found.home.value) == ([A], C)
+
+
+def test_tracks_of_one_position_hinder_nothing():
+    """As receivers write them where they are switched on and off."""
+    lone = f"<trk><name>ACTIVE LOG 003</name><trkseg>{points('trkpt', C)}</trkseg></trk>"
+    assert places_of(gpx.read(gpx_of(f"<rte>{points('rtept', A, B)}</rte>", lone), "f")) == [A, B]
+    drive = f"<trk><trkseg>{points('trkpt', A, B)}</trkseg><trkseg>{points('trkpt', C)}</trkseg></trk>"
+    assert places_of(gpx.read(gpx_of(lone, drive), "f")) == [A, B]
+
+
+def test_times_without_a_place_hinder_nothing_in_a_track():
+    """`gx:Track` has an empty `gx:coord` for each; OpenTracks writes them."""
+    coords = "".join(f"<coord>{text}</coord>" for text in ("", "11.5 48.1 500", " ", "11.501 48.101 500"))
+    text = f"<kml><Placemark><name>t</name><Track>{coords}</Track></Placemark></kml>"
+    assert places_of(kml.read(text, "f", Choices(roles={"t": Role.ROUTE}))) == [A, B]
 
 
 def test_a_lone_track_is_taken_for_the_route_and_it_is_said():
@@ -93,7 +123,7 @@ def test_of_several_tracks_one_is_chosen():
         (gpx_of('<wpt lat="48,1" lon="2"/>'), "f: line 1: '48,1' has a decimal comma"),
         (gpx_of('<wpt lon="2"/>'), "f: line 1: '' is not a number"),
         (gpx_of('<wpt lat="91" lon="2"/>'), "f: line 1: latitude 91° is beyond"),
-        (gpx_of(f"<rte>{points('rtept', A)}</rte>"), "f: line 1: 1 position; expected at least 2"),
+        (gpx_of(f"<trk><trkseg>{points('trkpt', A)}</trkseg></trk>"), "f: contains no features"),
     ],
 )
 def test_gpx_that_is_none(text, problem):

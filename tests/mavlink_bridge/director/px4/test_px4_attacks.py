@@ -25,6 +25,7 @@ from director.px4.px4_runs import (
     upload,
     wait,
 )
+from director.soak import SETTINGS, soak
 from director.test_bridge_director import reposition
 
 from mavlink_bridge.director import EventName, State
@@ -476,3 +477,12 @@ class TestFences:
         items = len(run.vehicles[0].fence)
         assert run.last(EventName.DRIVING).time_s >= written_s + 0.1 * (items + 1)
         arrives(run, FAR)
+
+
+@VERSIONS
+@pytest.mark.parametrize("setting", ["calm", "dense"])
+def test_a_few_minutes_of_the_soak_keep_every_promise(firmware, setting):
+    hours = {"calm": 0.08, "dense": 0.03}[setting]
+    run = soak(2, hours, autopilot=m.Autopilot.PX4, firmware=firmware, **SETTINGS[setting])
+    assert run.violations == []
+    assert run.counts["target"] > 1

@@ -38,7 +38,7 @@ OWN_TESTS = {
     "test_obstacles": "test_px4_gaps: TestObstacles; test_px4_bridge",
     "test_repaired_drives": "a JUMP and a CONDITION are driven otherwise by PX4: tests/missions/checking/test_px4_plans.py",
     "test_rolling_out": "PX4's loop is not foreseen: test_px4_gaps: test_the_roll_out_of_hold_is_not_foreseen_straight",
-    "test_soak": "tests/mavlink_bridge/director/soak.py runs ArduPilot's rover alone",
+    "test_soak": "test_px4_attacks: test_a_few_minutes_of_the_soak_keep_every_promise",
     "test_two_vehicles": "test_px4_bridge: one vehicle a link; a link with two PX4 rovers was not tried",
     "test_way_home_inside": "PX4 has no JUMP_TAG",
 }

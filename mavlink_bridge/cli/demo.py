@@ -113,9 +113,9 @@ def demo(options: DemoOptions) -> None:
         raise typer.Exit(ExitCode.CHECK)
 
 
-def demo_rover(speedup: float) -> Simulator:
+def demo_rover(autopilot: str, firmware: Firmware | None, speedup: float) -> Simulator:
     """Return a rover in the maze on a link of its own, for who wants to see it drive."""
-    return Simulator(_config(Autopilot.ARDUPILOTMEGA, None), _ANY_PORT, speedup=speedup)
+    return Simulator(_config(AUTOPILOTS[autopilot], firmware), _ANY_PORT, speedup=speedup)
 
 
 def _rover(options: DemoOptions) -> SteppedRover:

@@ -32,6 +32,8 @@ def serve(options: ServeOptions) -> None:
         raise UsageError("--upload needs a vehicle: --connect CONNECTION, or --demo")
     if options.record is not None and not has_vehicle:
         raise UsageError("--record needs a vehicle: --connect CONNECTION, or --demo")
+    if options.autopilot is not None and not options.demo:
+        raise UsageError("--autopilot goes with --demo: any other source says which it is")
     if options.start is not None and options.fence is None:
         raise UsageError("--start goes with --fence: a vehicle reports its own position")
     if options.home is not None and has_vehicle:

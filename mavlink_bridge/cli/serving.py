@@ -214,7 +214,8 @@ def _served_live(options: ServeOptions, request: Request) -> None:
     with contextlib.ExitStack() as stack:
         connection, source, name = options.connect or "", "live", options.connect or ""
         if options.demo:
-            simulator = stack.enter_context(demo_rover(options.speedup))
+            rover = demo_rover(options.autopilot or "ardupilot", options.firmware, options.speedup)
+            simulator = stack.enter_context(rover)
             connection, source, name = simulator.connection, "demo", "simulated rover"
         orders = _orders(options, request)
         described = described_vehicle(options)

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.errors import BridgeError, OutcomeError, RefusedError
 from mavlink_bridge.mavlink.drive_rules import FirstItem
-from mavlink_bridge.mavlink.messages import MissionSetCurrent, MissionType
+from mavlink_bridge.mavlink.messages import MissionType
+from mavlink_bridge.protocol.first_item import BeginAtFirstItem
+from missions.items import Command
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from mavlink_bridge.cli.session import Session
+    from missions.items import MissionItem
 
 _STATE_PATIENCE_S = 2.0
 """MISSION_CURRENT comes at least once a second where it is streamed."""
-
-_TIMES = 3
-"""So often a message is sent that nothing answers; chosen."""
 
 _ADVICE = "arm it in HOLD, then run this again or switch it to AUTO yourself"
 
@@ -47,6 +47,27 @@ def make_ready(session: Session, *, hold: bool, replace_active: bool) -> None:
             f"the vehicle is armed and driving its mission in {modes.named(modes.mission)}; nothing was written",
             advice="add --hold to switch it to HOLD first, or --replace-active to write while it drives",
         )
+
+
+def check_drivable(session: Session, missions: Iterable[Iterable[MissionItem]]) -> None:
+    """Find in missions that are to be driven what the vehicle does otherwise than it looks.
+
+    Raises
+    ------
+    RefusedError
+        An RTL item leads out of the mission, straight home through any zone.
+    """
+    table = session.autopilot
+    if not table.driving.leaves_mission_for_rtl:
+        return
+    for items in missions:
+        for number, item in enumerate(items, 1):
+            if item.command == Command.NAV_RETURN_TO_LAUNCH:
+                raise RefusedError(
+                    f"item {number} of the mission is RTL: {table.kind} leaves the mission for it and drives straight home, through any zone; nothing was written",
+                    advice="plan the way home (pbpp plan --return), or upload the mission without --drive, look where RTL leads (pbpp check), and start it yourself",
+                    item=number,
+                )
 
 
 def fence_warnings(session: Session, lists: Iterable[MissionType]) -> list[str]:
@@ -83,8 +104,7 @@ def start_driving(session: Session) -> None:
             mode=mode,
         )
     if session.autopilot.driving.first_item is FirstItem.BY_MESSAGE_BEFORE:
-        peer = session.vehicle
-        session.link.send_all([MissionSetCurrent(peer.system, peer.component, 0) for _ in range(_TIMES)])
+        session.run(BeginAtFirstItem(session.vehicle), "setting the first item")
     if doing.mode == modes.mission and doing.has_completed:
         session.change_mode(modes.hold)  # AUTO begins anew only out of another mode
     session.drives_by_us = True

@@ -13,7 +13,7 @@ from mavlink_bridge.cli.interrupting import interruptible, terminable
 from mavlink_bridge.cli.options.upload import LISTS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
-from mavlink_bridge.cli.starting import fence_warnings, make_ready, start_driving
+from mavlink_bridge.cli.starting import check_drivable, fence_warnings, make_ready, start_driving
 from mavlink_bridge.cli.terminal import echo, print_json
 from mavlink_bridge.cli.uploading import Uploads
 from mavlink_bridge.errors import UsageError
@@ -58,6 +58,9 @@ def upload(options: UploadOptions) -> None:
             if not restoration:
                 warn(interrupted_warnings(store, uploads.vehicle))
             warn(_file_remarks(options.file, held, session.heard))
+            if options.drive:
+                missions = (items for kind, items in _kinds(lists, backups) if kind is MissionType.MISSION)
+                check_drivable(session, (_as_sent(session, MissionType.MISSION, one) for one in missions))
             make_ready(session, hold=options.hold, replace_active=options.replace_active)
             warn(fence_warnings(session, [kind for kind, _ in lists] + [one.mission_type for one in backups]))
             fences = [items for kind, items in _kinds(lists, backups) if kind is MissionType.FENCE]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mavlink_bridge.director.operator_watch import OperatorWatch
+from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import TRANSITIONS, Cue, Signal, State
 from mavlink_bridge.director.steps import Steps
 from mavlink_bridge.director.voice import Voice
@@ -76,6 +77,7 @@ class Core(TableMachine[State, Cue]):
         self.heartbeat_s = -math.inf
         self.watch = VehicleWatch()
         self.operator = OperatorWatch()
+        self.operator.clicks_are_targets = TargetSource.REPOSITION in orders.target_sources
         self.steps = Steps(heed)
         self.voice = Voice(announce=orders.announce)
         self.target: Target | None = None

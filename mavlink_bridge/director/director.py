@@ -271,7 +271,7 @@ class Director:
 
     def start_drive(self, now_s: float) -> None:
         """Take the operator's word to drive: what is verified now, or once it is. A new target takes it back."""
-        self._heed(self._parts.starter.begin_on_word(), now_s)
+        self._heed(self._parts.starter.begin_on_word(now_s), now_s)
 
     def hold(self, reason: str, now_s: float) -> None:
         """Stop the vehicle because a person asks for it, and let go of all that was wanted; ignored without orders to drive, and before a vehicle was found.

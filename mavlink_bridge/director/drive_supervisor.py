@@ -69,6 +69,8 @@ class DriveSupervisor(Part):
             self._note_item(message)
         if self.core.state is not State.DRIVING or self.drive is None:
             return []
+        if isinstance(message, m.MissionCurrent) and self.drive.has_skipped(message, now_s):
+            return self._stop_elsewhere(now_s)
         signals = self._follow_choice(now_s) if isinstance(message, m.MissionCurrent) else []
         self.drive.receive(frame, now_s)
         return [*signals, Cue.REACHED] if self.drive.has_arrived else signals
@@ -95,6 +97,18 @@ class DriveSupervisor(Part):
         if self.drive is not None:
             self.drive.follow(core.plan, self._item_now)
         return [Notice.WAY_CHOSEN]
+
+    def _stop_elsewhere(self, now_s: float) -> list[Signal]:
+        """Return that a new route is wanted: the vehicle does not begin at the first item, and drives off the route."""
+        core = self.core
+        if not (self._is_our_start and core.orders.drive):
+            return []
+        trouble = OutcomeError(
+            f"the mission was not begun at its first item, but at item {self._item_now}: HOLD, then a new route",
+            item=self._item_now,
+        )
+        core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
+        return [Notice.ROUTE_WANTED]
 
     def has_ended(self, taken: Takeover, now_s: float) -> bool:
         """Return whether a change of mode is the end of our drive: some autopilots hold by themselves where their mission ends."""

@@ -49,7 +49,13 @@ _GRAVE = 4  # MAV_SEVERITY_WARNING
 
 
 class FenceGuard(Part):
-    """Knows when the vehicle's fence counts, and whether its mission does."""
+    """Knows when the vehicle's fence counts, and whether its mission does.
+
+    Attributes
+    ----------
+    has_refused : bool
+        Whether the vehicle did not take our newest mission for valid.
+    """
 
     def __init__(self, core: Core) -> None:
         super().__init__(core)
@@ -62,6 +68,7 @@ class FenceGuard(Part):
         self._texts: deque[tuple[float, str]] = deque(maxlen=_MOST_TEXTS)
         self._left_out: dict[str, str] = {}  # zones and why
         self._told: frozenset[tuple[str, str]] = frozenset()
+        self.has_refused = False
 
     @property
     def deadline_s(self) -> float | None:
@@ -76,6 +83,7 @@ class FenceGuard(Part):
 
     def verified(self, now_s: float, *, may_begin: bool) -> Sequence[Signal]:
         """Go on from a verified mission: at once where a fence counts at once, else when it does and the mission was not refused."""
+        self.has_refused = False
         if not self._has_to_wait:
             return [Cue.DRIVE] if may_begin else self.core.end()
         if self.core.orders.once and not self.core.orders.drive:
@@ -141,6 +149,7 @@ class FenceGuard(Part):
 
     def _refused(self, now_s: float) -> Sequence[Signal]:
         self._verified_s = math.inf
+        self.has_refused = True
         told = dict.fromkeys(text for time_s, text in self._texts if now_s <= time_s + _TEXTS_S)
         why = "".join(f"; {text}" for text in told)
         name = self.core.autopilot.kind

@@ -45,8 +45,11 @@ _STOP_PATIENCE_S = 8.0
 _DRIVEN_MPS = 0.8
 """Faster than a PX4 rover at rest in HOLD was ever told to be: 0.6 m/s, in recordings of both versions."""
 
+_LOOP_S = 3.5
+"""PX4's loop takes so long at the most, as measured."""
+
 _DIVERTED_AFTER_S = 5.0
-"""A vehicle that a click drives in HOLD still moves so long after it: every other is at rest by then (PX4's loop takes 3.5 s at the most, as measured)."""
+"""A vehicle that a click drives in HOLD still moves so long after it: every other is at rest by then."""
 
 
 _LATE_CLICK_S = _DIVERTED_AFTER_S + 4.0
@@ -107,6 +110,8 @@ class Halter(Part):
     def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
         """Take each position of a vehicle that comes to rest."""
         core, pose = self.core, self.core.situation.pose
+        if isinstance(frame.message, m.Statustext) and core.is_from_vehicle(frame):
+            self._take_text(frame.message.text, now_s)
         is_position = isinstance(frame.message, m.GlobalPositionInt) and core.is_from_vehicle(frame)
         if core.state is not State.HOLDING or not is_position or pose is None:
             return []
@@ -120,6 +125,12 @@ class Halter(Part):
             self.expected = resting_pose(core.situation, core.orders.request, self._rolling)
         self._expected_s = now_s
         return [] if self.expected is None else [Cue.HELD]
+
+    def _take_text(self, text: str, now_s: float) -> None:
+        """Wait anew where the vehicle tells of another breach while its loop lasts: its autopilot stops it once more, and it moves on that much longer."""
+        is_in_loop = self._held_at_s is not None and now_s <= self._held_at_s + _LOOP_S
+        if is_in_loop and self.core.autopilot.incidents.tells_breach_alone(text):
+            self._held_at_s = now_s
 
     def handle_timer(self, now_s: float) -> Sequence[Signal]:
         """Send HOLD again, or see whether the vehicle stands."""
@@ -182,15 +193,19 @@ class Halter(Part):
         """Return whether the vehicle may be on its way; a click, or an RTL, sets it going before any heartbeat says so."""
         has_set_off = target is not None and target.has_set_off
         situation = self.core.situation
-        is_driving = situation.mode != self.core.modes.hold or self._moves_in_hold
+        is_driving = situation.mode != self.core.modes.hold or self.moves_in_hold
         return has_set_off or (bool(situation.armed) and is_driving)
 
     @property
-    def _moves_in_hold(self) -> bool:
+    def moves_in_hold(self) -> bool:
         """Whether a vehicle that a click drives in HOLD moves there."""
         pose = self.core.situation.pose
         drives_in_hold = self.core.autopilot.driving.clicks_drive_in_hold
         return drives_in_hold and pose is not None and pose.value.speed_mps > _DRIVEN_MPS
+
+    def may_be_clicked(self, now_s: float) -> bool:
+        """Return whether a click that was heard may have come to the vehicle just now, and drive it in the mode that stops."""
+        return now_s <= self._clicked_s + _LATE_CLICK_S
 
     # Stopping
 
@@ -236,9 +251,7 @@ class Halter(Part):
         self.core.voice.tell(now_s, EventName.HOLDING, f"HOLD: {reason}", reason)
         self.may_be_in_auto = self._is_for_good = True
         drives_in_hold = self.core.autopilot.driving.clicks_drive_in_hold
-        self._is_diverted = drives_in_hold and (
-            self._moves_in_hold or now_s <= self._clicked_s + _LATE_CLICK_S
-        )
+        self._is_diverted = drives_in_hold and (self.moves_in_hold or self.may_be_clicked(now_s))
         self.command_hold(now_s)
 
     def _note_click(self, target: Target, now_s: float) -> None:
@@ -315,11 +328,11 @@ class Halter(Part):
         """Return whether the vehicle drives in HOLD, longer than its stop takes."""
         if self._held_at_s is None or self.stopping is not None:
             return False
-        return now_s >= self._held_at_s + _DIVERTED_AFTER_S and self._moves_in_hold
+        return now_s >= self._held_at_s + _DIVERTED_AFTER_S and self.moves_in_hold
 
     def _stop_diverted(self, now_s: float) -> Sequence[Signal]:
         """Stop a vehicle that a click has sent away after our HOLD; where none was heard, somebody else drives it."""
-        if now_s > self._clicked_s + _LATE_CLICK_S:
+        if not self.may_be_clicked(now_s):
             return [Notice.DRIVEN_IN_HOLD]
         self._is_diverted, self._held_at_s = True, None
         self._standstill_due_s = math.inf

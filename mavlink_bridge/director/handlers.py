@@ -256,8 +256,9 @@ def _on_mission_invalid(parts: Parts, now_s: float) -> Iterable[Signal]:
     return _on_gone_on(parts, now_s)
 
 
-def _on_driven_in_hold(parts: Parts, _now_s: float) -> Iterable[Signal]:
-    parts.hand_over.taken = Takeover(parts.core.modes.hold)
+def _on_taken_unseen(parts: Parts, _now_s: float) -> Iterable[Signal]:
+    """Leave the vehicle to who has it: no change of mode was seen, and what it does is not ours."""
+    parts.hand_over.taken = Takeover(parts.core.situation.mode)
     return [Cue.TAKEN_OVER]
 
 
@@ -362,7 +363,8 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.LEARNING_FAILED: _learn_again,
     Notice.HOLD_ASKED: _on_hold_asked,
     Notice.HOLD_ENDED: _on_hold_ended,
-    Notice.DRIVEN_IN_HOLD: _on_driven_in_hold,
+    Notice.SWITCHED_BACK: _on_taken_unseen,
+    Notice.DRIVEN_IN_HOLD: _on_taken_unseen,
     Notice.MISSION_INVALID: _on_mission_invalid,
     Notice.UPLOAD_ENDED: _on_upload_ended,
     Notice.DRIVE_ENDED: _on_drive_ended,

@@ -11,7 +11,7 @@ Who calls
 RTL        the vehicle is seen in RTL or SMART_RTL, or a ground station asks it for that, with `--rtl-by-route`; whoever it was
 battery    at or below what the options say, or the autopilot's own text of a low battery (`battery_watch`)
 silence    no heartbeat of a ground station for so long, once one was heard
-breach     FENCE_STATUS tells of a breach on a drive of ours
+breach     FENCE_STATUS tells of a breach on a drive of ours, or a text does, of an autopilot that sends none
 
 The last three call only a vehicle that we have in hand: one on our drive, or that stands in HOLD since it has arrived. What an operator drives, or has
 stopped, is left to the operator, and that is said.
@@ -43,6 +43,7 @@ from mavlink_bridge.director.battery_watch import BatteryWatch
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import fix_trouble, is_better
+from mavlink_bridge.director.incidents import SAME_S
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.targets import HomeCall, Target
@@ -125,6 +126,7 @@ class HomeCaller(Part):
         self._second_s = -math.inf  # when the second RTL was heard or seen last
         self._is_seen = True  # the mode told last was told a moment ago
         self._was_breached = False
+        self._breach_text_s = -math.inf
         self._bad_fixes = 0
         self._arrived_s: float | None = None  # since when it stands in HOLD after a drive of ours
         self._refused_fix: Fix | None = None
@@ -162,6 +164,8 @@ class HomeCaller(Part):
             return self._look_at_fix(now_s)
         if isinstance(message, m.FenceStatus):
             return self._look_at_breach(message, now_s)
+        if isinstance(message, m.Statustext) and self._tells_breach(message, now_s):
+            return self._take_breach(now_s)
         low = self._battery.receive(message, now_s)
         return self._call_in_hand(HomeCall.BATTERY, low, now_s) if low else []
 
@@ -238,8 +242,18 @@ class HomeCaller(Part):
 
     def _look_at_breach(self, status: m.FenceStatus, now_s: float) -> Sequence[Signal]:
         was_breached, self._was_breached = self._was_breached, bool(status.breach_status)
-        is_new = self._was_breached and not was_breached
-        if not is_new or self.core.state not in (State.STARTING, State.DRIVING):
+        return self._take_breach(now_s) if self._was_breached and not was_breached else []
+
+    def _tells_breach(self, text: m.Statustext, now_s: float) -> bool:
+        """Return whether a text tells of a breach that nothing else tells of; the same text just after it tells of the same."""
+        if not self.core.autopilot.incidents.tells_breach_alone(text.text):
+            return False
+        is_new = now_s > self._breach_text_s + SAME_S
+        self._breach_text_s = now_s
+        return is_new
+
+    def _take_breach(self, now_s: float) -> Sequence[Signal]:
+        if self.core.state not in (State.STARTING, State.DRIVING):
             return []
         if self._is_called:
             return self._hold_again(now_s)

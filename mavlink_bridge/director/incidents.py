@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from missions.request import Request
     from missions.situation import Known, Pose, Situation
 
-_SAME_S = 2.0
+SAME_S = 2.0
 """A text and a FENCE_STATUS, or two texts on one failsafe, that come so soon after another tell of the same."""
 
 _AT_MOST_EVERY_S = 1.0
@@ -102,7 +102,7 @@ class Incidents:
         """Return whether the autopilot has just told that it does not drive the mission any more."""
         told = self.autopilot.incidents.shown_by_text
         return any(
-            cause.reason in told and now_s <= cause.heard_s + _SAME_S for cause in self._causes.values()
+            cause.reason in told and now_s <= cause.heard_s + SAME_S for cause in self._causes.values()
         )
 
     def heard_before(self, now_s: float) -> Cause | None:
@@ -146,7 +146,7 @@ class Incidents:
         new = status.breach_count - before
         if new <= 0:  # the count has started anew where it is less
             new = int(self._is_breached and not was_breached)
-        if new and now_s <= self._breach_text_s + _SAME_S:  # its text has told of it
+        if new and now_s <= self._breach_text_s + SAME_S:  # its text has told of it
             self._breach_text_s = -math.inf
             new -= 1
         if new and now_s < self._breach_told_s + _AT_MOST_EVERY_S:  # counted with the next status after that
@@ -161,7 +161,7 @@ class Incidents:
         return Cause(_BREACH, now_s, modes, needs_heartbeat=rules.shown_by_heartbeat)
 
     def _take_breach_text(self, situation: Situation, now_s: float) -> None:
-        if now_s > self._breach_told_s + _SAME_S:
+        if now_s > self._breach_told_s + SAME_S:
             self._tell_breach(1, None, situation, now_s)
             self._breach_text_s = now_s
 
@@ -194,7 +194,7 @@ class Incidents:
 
     def _take_text(self, text: str, situation: Situation, now_s: float) -> None:
         rules = self.autopilot.incidents
-        if _matches(rules.breach_text, text):
+        if rules.tells_breach(text):
             self._take_breach_text(situation, now_s)
         elif rules.goes_on_text is not None and _matches(rules.goes_on_text, text):  # then it does not switch
             self._causes.clear()
@@ -215,7 +215,7 @@ class Incidents:
             modes = frozenset()  # the vehicle's own word for it says nothing, so nothing is claimed
         needs_heartbeat = rules.shown_by_heartbeat and reason not in rules.shown_by_text
         mode = self._note(Cause(reason, now_s, modes, needs_heartbeat=needs_heartbeat))
-        is_told = now_s <= self._told_s.get(reason, -math.inf) + _SAME_S
+        is_told = now_s <= self._told_s.get(reason, -math.inf) + SAME_S
         self._told_s[reason] = now_s
         if is_told and mode is None:
             return

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.takeover import Takeover
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.modes import ARDUPILOT_MODES, Modes
+from mavlink_bridge.protocol.wire import INT32_MAX
 from missions.items import Command
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ _ON_ITS_WAY_S = 0.5
 _CLICK_S = 1.5
 """A ground station's GUIDED within this time of its go-to click is part of the click."""
 
+_CHANGES_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+
 _CRITICAL = 5  # MAV_STATE_CRITICAL
 
 _LATE_CLICK_S = 3.0
@@ -42,10 +45,13 @@ class OperatorWatch:
     ----------
     modes : Modes
         Those of the vehicle's autopilot.
+    clicks_are_targets : bool
+        Whether a go-to click that is overheard is a target of ours, and so nobody's taking over.
     """
 
     def __init__(self) -> None:
         self.modes: Modes = ARDUPILOT_MODES
+        self.clicks_are_targets = False
         self._ours: int | None = None
         self._fading: frozenset[int] = frozenset()
         self._fading_until_s = math.inf
@@ -136,7 +142,24 @@ class OperatorWatch:
             return None
         if message.command == Command.DO_SET_MODE:
             return self.modes.asked_for(message.param2, message.param3)
+        if message.command == Command.DO_REPOSITION:
+            return self._mode_of_click(message)
         return self.modes.of_commands.get(message.command)
+
+    def _mode_of_click(self, message: m.CommandLong | m.CommandInt) -> int | None:
+        """Return the mode that a click leads to, where no heartbeat may tell of it: the one that stops may be on already.
+
+        Without a place it is QGroundControl's "Pause", and stops the vehicle. Without its flag a click does nothing in another mode.
+        """
+        if self.modes.guided is not None:
+            return None
+        place = (
+            (message.x, message.y) if isinstance(message, m.CommandInt) else (message.param5, message.param6)
+        )
+        is_pause = not all(math.isfinite(value) and value != INT32_MAX for value in place)
+        changes_mode = math.isfinite(message.param2) and bool(int(message.param2) & _CHANGES_MODE)
+        acts = changes_mode or self._ours == self.modes.hold
+        return self.modes.hold if acts and (is_pause or not self.clicks_are_targets) else None
 
 
 def _is_disarming(message: Message) -> bool:

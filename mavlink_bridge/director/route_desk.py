@@ -137,7 +137,7 @@ class RouteDesk(Part):
         """Return why a mission is not driven whose end looks like somebody's taking over; None where it does not."""
         core = self.core
         ends_so = any(item.command == Command.NAV_RETURN_TO_LAUNCH for item in made.items)
-        if not (ends_so and core.orders.drive and core.autopilot.driving.ends_in_hold):
+        if not (ends_so and core.orders.drive and core.autopilot.driving.leaves_mission_for_rtl):
             return None
         return SituationError(
             f"{core.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "

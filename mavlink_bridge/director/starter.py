@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.halter import STILL_MPS
-from mavlink_bridge.director.states import ON_VEHICLE, Cue, Signal, State
+from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
 from mavlink_bridge.director.steps import Step, step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.drive_rules import FirstItem
 from mavlink_bridge.protocol.command import SendCommand
+from mavlink_bridge.protocol.first_item import BeginAtFirstItem
 from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
 from mavlink_bridge.protocol.standstill import AwaitStandstill
 from missions.items import Command
@@ -35,10 +36,6 @@ START_YOURSELF = "arm it, then give the target again (or run the command again);
 
 _MOVED_M = 1.0
 """A vehicle that stands within this of where its route begins counts as not having moved since it was planned."""
-
-
-_TIMES = 3
-"""So often a message is sent that nothing answers: it changes nothing where it came before. Chosen."""
 
 
 class Starter(Part):
@@ -76,9 +73,11 @@ class Starter(Part):
         is_home = target is not None and target.is_home
         return orders.drive and (not orders.starts_on_word or self.is_told or is_home)
 
-    def begin_on_word(self) -> Sequence[Signal]:
-        """Return that a person gives the word to drive: now, or once the mission is verified."""
+    def begin_on_word(self, now_s: float) -> Sequence[Signal]:
+        """Return that a person gives the word to drive: now, or once the mission is verified; one that the vehicle has refused is judged again first."""
         self.is_told = True
+        if self.core.state in ON_VEHICLE and self._fence.has_refused:
+            return self._fence.verified(now_s, may_begin=self.may_begin)
         is_ready = self.core.state in ON_VEHICLE and not self._fence.is_waiting
         return [Cue.DRIVE] if is_ready and self.may_begin else []
 
@@ -111,6 +110,8 @@ class Starter(Part):
         if self._lists.has_suspects or is_waiting or not core.operator.is_ours(situation.mode):
             self.look_once_more(now_s)
             return []
+        if driven := self._driven_in_hold(now_s):
+            return driven
         if not self._fence.counts(now_s):
             self._adopter.forget()
             return [Cue.RENEWED]
@@ -128,7 +129,7 @@ class Starter(Part):
         if core.orders.arm and not situation.armed:
             core.steps.run([self._command(Command.COMPONENT_ARM_DISARM, self._armed)], now_s)
         else:
-            self._switch_to_auto(now_s)
+            self._go_off(now_s)
         return []
 
     def note_failed(self, trouble: BridgeError, now_s: float) -> Sequence[Signal]:
@@ -164,18 +165,39 @@ class Starter(Part):
         if not _is_accepted(machine):
             return self._refused(machine, now_s)
         if self.core.situation.mode == self.core.modes.hold:
-            self._switch_to_auto(now_s)
+            self._go_off(now_s)
         else:  # a heartbeat from before our HOLD, overtaken on the way, or an operator: the next one tells which
             self.look_once_more(now_s)
         return []
+
+    def _go_off(self, now_s: float) -> None:
+        """Switch to AUTO, with the first item the current one where that is to be before."""
+        core = self.core
+        assert core.peer is not None
+        if self._first_item is FirstItem.BY_MESSAGE_BEFORE:
+            core.steps.run([step(BeginAtFirstItem(core.peer), self._first_item_set)], now_s)
+        else:
+            self._switch_to_auto(now_s)
+
+    def _first_item_set(self, _machine: BeginAtFirstItem, now_s: float) -> Sequence[Signal]:
+        if driven := self._driven_in_hold(now_s):
+            return driven
+        self._switch_to_auto(now_s)
+        return []
+
+    def _driven_in_hold(self, now_s: float) -> Sequence[Signal]:
+        """Return what follows where the vehicle moves in the mode that stops: a click that was heard has come to it late, or somebody else drives it."""
+        halter = self._halter
+        if self.core.situation.mode != self.core.modes.hold or not halter.moves_in_hold:
+            return []
+        self._adopter.forget()
+        return [Notice.ROUTE_WANTED if halter.may_be_clicked(now_s) else Notice.DRIVEN_IN_HOLD]
 
     def _switch_to_auto(self, now_s: float) -> None:
         core, situation = self.core, self.core.situation
         assert core.peer is not None
         self._halter.may_be_in_auto = True
         core.operator.expect(core.modes.mission, {situation.mode}, is_armed=bool(situation.armed))
-        if self._first_item is FirstItem.BY_MESSAGE_BEFORE:
-            core.send(*(m.MissionSetCurrent(core.peer.system, core.peer.component, 0) for _ in range(_TIMES)))
         core.steps.run([step(ModeSwitch(core.peer, core.modes.mission), self._in_auto)], now_s)
 
     @property
@@ -183,6 +205,10 @@ class Starter(Part):
         return self.core.autopilot.driving.first_item
 
     def _in_auto(self, machine: ModeSwitch, now_s: float) -> Sequence[Signal]:
+        if machine.is_left:
+            self._adopter.forget()
+            self._tell_failed("DO_SET_MODE", machine.result_name, machine.texts, now_s)
+            return [Notice.SWITCHED_BACK]
         if not machine.is_granted:
             self._driver.stand_by()
             return self._failed("DO_SET_MODE", machine.result_name, "", now_s)
@@ -222,11 +248,15 @@ class Starter(Part):
     def _failed(self, name: str, result: str, texts: str, now_s: float) -> Sequence[Signal]:
         self.core.steps.clear()
         self._adopter.forget()
-        self.core.voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}", name, result)
+        self._tell_failed(name, result, (), now_s)
         kind = OutcomeError if result == "no answer" else RefusedError
         return self.core.fail_step(
             kind(f"the mission is on the vehicle, but it refused {name}: {result}{texts}")
         )
+
+    def _tell_failed(self, name: str, result: str, texts: tuple[str, ...], now_s: float) -> None:
+        why = "".join(f"; {text.strip()}" for text in texts)
+        self.core.voice.tell(now_s, EventName.COMMAND_FAILED, f"{name}: {result}{why}", name, result)
 
 
 def _is_accepted(machine: SendCommand) -> bool:

@@ -38,6 +38,8 @@ class DriveRules:
     clicks_drive_in_hold : bool
         Whether a go-to click makes it drive in the mode that stops: the mode then does not tell that it moves, and asking for it again does not stop it. A
         place given in the same way does: its own.
+    leaves_mission_for_rtl : bool
+        Whether an RTL item of a mission leads out of the mode that drives missions, straight home through any zone: it looks like somebody's taking over.
     home_asked_by : tuple of Command and float
         The command that HOME_POSITION is asked for by, and its param1.
     """
@@ -48,6 +50,7 @@ class DriveRules:
     judges_missions: bool
     repeats_reached: bool
     clicks_drive_in_hold: bool
+    leaves_mission_for_rtl: bool
     home_asked_by: tuple[Command, float]
 
 
@@ -84,6 +87,7 @@ ARDUPILOT_DRIVING = DriveRules(
     judges_missions=False,
     repeats_reached=False,
     clicks_drive_in_hold=False,
+    leaves_mission_for_rtl=False,
     home_asked_by=(Command.GET_HOME_POSITION, 0.0),
 )
 ARDUPILOT_FENCE = FenceRules()
@@ -97,6 +101,7 @@ PX4_DRIVING = DriveRules(
     judges_missions=True,
     repeats_reached=True,
     clicks_drive_in_hold=True,
+    leaves_mission_for_rtl=True,
     home_asked_by=(Command.REQUEST_MESSAGE, _HOME_POSITION_ID),
 )
 """Set driving by its mode, not by MISSION_START: that arms, and would undo a disarming that crosses it on its way.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -84,6 +85,14 @@ class IncidentRules:
     answered_within_s: float
     shown_by_heartbeat: bool = False
     shown_by_text: frozenset[str] = frozenset()
+
+    def tells_breach(self, text: str) -> bool:
+        """Return whether a text of the vehicle tells of a breach."""
+        return re.match(self.breach_text, text.strip(), re.IGNORECASE) is not None
+
+    def tells_breach_alone(self, text: str) -> bool:
+        """Return whether it does, and nothing else will."""
+        return not self.counts_breaches and self.tells_breach(text)
 
 
 _RADIO, _GCS, _EKF, _BATTERY = "radio failsafe", "ground station failsafe", "EKF failsafe", "battery failsafe"

@@ -2,8 +2,8 @@
 
 DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is urgent: it is sent
 again every half second. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked. Nothing is sent again
-once it was accepted, for what is shown afterwards is somebody else's doing; only where the answer may be that to a command of ours before, a
-heartbeat has to show it.
+once it was accepted, for what is shown afterwards is somebody else's doing, also where ACCEPTED alone does not tell that the vehicle is in the mode (PX4
+1.17). Only HOLD is: it sets nothing going, and the answer may be that to a command of ours before.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ _HURRY_S = 0.5  # HOLD is sent again without waiting for heartbeats; chosen, not
 _PATIENCE_S = 8.0  # for a heartbeat: of one a second seven may be lost; chosen, not measured
 _SETTLE_S = 0.5
 """A heartbeat that comes sooner after a command may have been sent before it."""
+
+_SHOWN_BEFORE_S = 1.5
+"""A heartbeat that comes sooner after the answer may have been sent before it, as the director takes it, too; chosen, not measured."""
 
 _MOST_SENDS = 16  # at 50 % loss all are lost once in 65,000 times; chosen, not measured
 _MOST_S = 60.0  # 16 sends at a heartbeat a second take 16 s; where heartbeats are lost it takes longer
@@ -61,7 +64,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         self._mode = mode
         self._is_urgent = is_urgent
         self._sends = 0
-        self._sent_s = 0.0
+        self._sent_s = self._answered_s = 0.0
         self._give_up_s = 0.0
         self._result: MavResult | None = None
         self._reasons = Reasons(peer)
@@ -77,6 +80,11 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         return self.state is SwitchState.SEEN
 
     @property
+    def is_left(self) -> bool:
+        """Whether the vehicle said yes, and its heartbeat shows another mode: it was not available, or somebody has switched it since."""
+        return self.state is SwitchState.LEFT
+
+    @property
     def is_refused(self) -> bool:
         """Whether the vehicle said no."""
         return self.state is SwitchState.REFUSED
@@ -89,6 +97,8 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     @property
     def result_name(self) -> str:
         """How it was answered, by name."""
+        if self._result is MavResult.ACCEPTED and not self.is_granted:
+            return "accepted, but not shown by its heartbeat"
         return self._result.name if self._result is not None else "no answer"
 
     @property
@@ -119,10 +129,19 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         if isinstance(message, Heartbeat):
             if message.custom_mode == self._mode:
                 self._move(SwitchEvent.SEEN)
-            elif now_s >= self._sent_s + _SETTLE_S:
-                self._send_again(now_s)
+            else:
+                self._take_other_mode(now_s)
         elif isinstance(message, CommandAck) and message.command == Command.DO_SET_MODE:
-            self._take_ack(message.result)
+            self._take_ack(message.result, now_s)
+
+    def _take_other_mode(self, now_s: float) -> None:
+        """Take a heartbeat that shows another mode: say it again, unless it was accepted and somebody may have switched it since."""
+        is_stop = self._mode == self._peer.autopilot.modes.hold
+        if self.state is SwitchState.ACCEPTED and not is_stop:
+            if now_s >= self._answered_s + _SHOWN_BEFORE_S:
+                self._move(SwitchEvent.LEFT)
+        elif now_s >= self._sent_s + _SETTLE_S:
+            self._send_again(now_s)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
@@ -138,10 +157,12 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
     def _may_send_blindly(self) -> bool:
         return self._is_urgent and self.state is SwitchState.SENT
 
-    def _take_ack(self, result: int) -> None:
+    def _take_ack(self, result: int, now_s: float) -> None:
         known = {int(one): one for one in MavResult}.get(result)
         if known is None or known is MavResult.IN_PROGRESS:
             return
+        if self.state is SwitchState.SENT:
+            self._answered_s = now_s
         self._result = known
         self._move(SwitchEvent.ACCEPTED if known is MavResult.ACCEPTED else SwitchEvent.REFUSED)
 

@@ -421,6 +421,7 @@ class SwitchState(StrEnum):
     ACCEPTED = auto()
     SEEN = auto()
     REFUSED = auto()
+    LEFT = auto()  # accepted, and shown is another mode
     UNANSWERED = auto()
 
 
@@ -431,6 +432,7 @@ class SwitchEvent(StrEnum):
     ACCEPTED = auto()
     REFUSED = auto()
     SEEN = auto()
+    LEFT = auto()
     SILENCE = auto()
 
 
@@ -463,8 +465,12 @@ MODE_SWITCH_BY_HEARTBEAT: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
         **MODE_SWITCH_UNTIL_SEEN[SwitchState.SENT],
         SwitchEvent.REFUSED: SwitchState.REFUSED,
     },
+    SwitchState.ACCEPTED: {
+        **MODE_SWITCH_UNTIL_SEEN[SwitchState.ACCEPTED],
+        SwitchEvent.LEFT: SwitchState.LEFT,
+    },
 }
-"""The same where the vehicle accepts what it does not do (PX4 1.17), but refuses only what it does not do."""
+"""The same where the vehicle accepts what it does not do (PX4 1.17), but refuses only what it does not do: then it, or somebody, has decided otherwise."""
 
 
 def _with_ends(table: dict[StateT, dict[EventT, StateT]]) -> dict[StateT, dict[EventT, StateT]]:

@@ -17,7 +17,7 @@ from mavlink_bridge.cli.options.shared import (
     flag,
     option,
 )
-from mavlink_bridge.cli.values import within
+from mavlink_bridge.cli.values import autopilot_from, within
 
 _SERVER, _SOURCE = "Server", "Source"
 
@@ -76,6 +76,15 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
             parser=within(1.0, 20.0),
         ),
     ] = 1.0
+    autopilot: Annotated[
+        str | None,
+        option(
+            "With --demo: the autopilot that the rover answers as, ardupilot (the default) or px4; --firmware is then its version.",
+            "AUTOPILOT",
+            panel=_SOURCE,
+            parser=autopilot_from,
+        ),
+    ] = None
     connect: ConnectOption = None
     log: Annotated[Path | None, option("Replay this log, with a timeline.", "FILE.tlog", panel=_SOURCE)] = (
         None

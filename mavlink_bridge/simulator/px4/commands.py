@@ -22,7 +22,7 @@ _UNUSED_1_18: dict[int, range] = {
 """Parameters that 1.18 wants 0 or NaN; measured of DO_SET_MODE's param4 to 7 and of param3 when arming."""
 
 _CHANGE_MODE = 1  # MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
-_MOST_LAT_E7, _MOST_LON_E7 = 900_000_000, 1_800_000_000
+_NOT_SET = 2**31 - 1  # INT32_MAX
 
 
 class Px4Commands:
@@ -101,12 +101,14 @@ class Px4Commands:
         return MavResult.ACCEPTED
 
     def _reposition(self, command: CommandLong | CommandInt) -> MavResult:
-        """Drive there; without the flag 1.17 answers UNSUPPORTED and drives in HOLD all the same."""
+        """Drive there, without a place (QGroundControl's "Pause") to where it is, as read; without the flag 1.17 answers UNSUPPORTED and drives in HOLD all the same."""
         changes_mode = bool(int(command.param2) & _CHANGE_MODE)
+        place: LatLon | None
         if isinstance(command, CommandInt):
-            place = from_e7(command.x, command.y)
+            place = from_e7(command.x, command.y) if _NOT_SET not in (command.x, command.y) else None
         else:
-            place = LatLon(command.param5, command.param6)
+            is_placed = math.isfinite(command.param5 + command.param6)
+            place = LatLon(command.param5, command.param6) if is_placed else None
         drives = self._rover.is_armed and self._rover.go_to(place, changes_mode=changes_mode)
         if changes_mode:
             return MavResult.ACCEPTED

@@ -232,13 +232,13 @@ class Px4Rover:
         self.progress.wait_until_s = None
         return True
 
-    def go_to(self, place: LatLon, *, changes_mode: bool) -> bool:
-        """Drive straight to a place; return whether it does so in HOLD."""
+    def go_to(self, place: LatLon | None, *, changes_mode: bool) -> bool:
+        """Drive straight to a place, without one to where it is; return whether it does so in HOLD."""
         if changes_mode:
             self._enter((AUTO, HOLD))
         if self.mode != (AUTO, HOLD):
             return False
-        self._goal_m = self.frame.to_flat(place)
+        self._goal_m = self.motion.position_m if place is None else self.frame.to_flat(place)
         self.progress.start_m = self.motion.position_m
         if self._area.clearance_m(self._goal_m) < 0:
             self._say(_CRITICAL, "Reposition is outside geofence")

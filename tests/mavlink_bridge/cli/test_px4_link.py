@@ -26,7 +26,7 @@ from missions.fence import CircleZone, Fence, PolygonZone, ZoneKind, fence_from_
 from missions.firmware import Firmware
 from missions.formats import read_situation, write_mission
 from missions.geo import LatLon, distance_m
-from missions.items import Command, change_speed, waypoint
+from missions.items import Command, CoordinateFrame, MissionItem, change_speed, waypoint
 from missions.situation import Known, Mission, Situation
 
 HOME = LatLon(40.071374, -105.229930)
@@ -235,6 +235,24 @@ class TestDrives:
             assert [one.get("not_enforced") for one in found["lists"]] == [[], None]
             assert simulator.vehicle.mode == PX4_MODES.mission
             assert set(modes_asked_for(sent)) == {(4.0, 4.0)}
+
+    def test_a_mission_that_leads_into_rtl_is_not_driven(self, tmp_path, firmware):
+        """PX4 leaves the mission for it, and drives straight home, through any zone."""
+        home = MissionItem(Command.NAV_RETURN_TO_LAUNCH, frame=CoordinateFrame.MISSION)
+        mission = Mission((waypoint(LatLon(HOME.lat_deg + 0.0001, HOME.lon_deg)), home), None)
+        path = tmp_path / "rtl.plan"
+        write_mission(Situation(mission=Known(mission, None, "test")), path)
+        with rover(PX4S, firmware) as (simulator, sent):
+            simulator.vehicle.rover.arm("a station")
+            code, found = run(simulator, "upload", path, "--drive")
+            assert (code, found["error"]) == (6, "RefusedError")
+            assert "item 2 of the mission is RTL" in found["message"]
+            assert "--return" in found["advice"]
+            assert not any(isinstance(message, m.MissionCount) for message in sent)
+            assert modes_asked_for(sent) == []
+            assert (
+                run(simulator, "upload", path)[0] == 0
+            )  # without --drive it is nobody's drive but who starts it
 
     def test_a_zone_that_will_not_be_enforced_is_told_before_and_after(self, tmp_path, firmware):
         fence = Fence((*INCLUSION.zones, CircleZone(ZoneKind.EXCLUSION, HOME, 3.0)))

@@ -14,8 +14,10 @@ from contextlib import ExitStack, contextmanager
 import httpx
 import pytest
 from processes import APART, end
+from typer.testing import CliRunner
 from websockets.sync.client import connect
 
+from mavlink_bridge.cli.app import app
 from mavlink_bridge.simulator import Simulator, SimulatorConfig
 from missions.fence import fence_to_items
 from missions.formats import read_fence
@@ -166,3 +168,25 @@ def test_one_command_shows_everything(tmp_path):
         page.die()
     journal = (tmp_path / "run.journal.jsonl").read_text(encoding="utf-8")
     assert '"call": "request"' in journal
+
+
+@pytest.mark.parametrize("firmware", ["1.17", "1.18"])
+def test_the_demonstration_of_a_px4_rover(tmp_path, firmware):
+    options = ("--demo", "--autopilot", "px4", "--firmware", firmware, "--listen", "127.0.0.1:0")
+    with serving(tmp_path, *options) as (_, address):
+        page = Page(address)
+        state = page.until(lambda state: drive_of(state) == "ready" and state["fence"]["meant"])
+        assert state["server"]["can"] == {"upload": True, "drive": True, "arm": True}
+        assert state["vehicle"]["autopilot"] == "PX4"
+        assert state["vehicle"]["firmware"].startswith(firmware)
+        page.post("targets", targets=[TARGET], clearance_m=2.5)
+        page.until(lambda state: state["drive"]["awaits_upload"])
+        page.die()
+
+
+def test_the_autopilot_of_a_demonstration_alone_is_chosen(tmp_path):
+    result = CliRunner().invoke(
+        app, ["serve", "--autopilot", "px4", "--fence", str(FIELDS / "maze-fence.waypoints")]
+    )
+    assert result.exit_code == 2
+    assert "--autopilot goes with --demo" in result.output

@@ -15,6 +15,7 @@ from mavlink_bridge.mavlink.autopilots import PX4_1_17, PX4_1_18
 from mavlink_bridge.mavlink.messages import MissionResult, MissionType
 from mavlink_bridge.mavlink.modes import PX4_MODES
 from mavlink_bridge.protocol.download import Download
+from mavlink_bridge.protocol.first_item import BeginAtFirstItem
 from mavlink_bridge.protocol.limits import Limits
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
 from mavlink_bridge.protocol.outcomes import Writing, end_of_upload
@@ -338,6 +339,21 @@ class TestModes:
         script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.hold))
         assert script.machine.state is SwitchState.SEEN
 
+    def test_what_was_accepted_is_not_said_again(self):
+        """Who has switched it back since may have meant it; a heartbeat that comes at once may be of before."""
+        script = Script(ModeSwitch(ON_1_17, PX4_MODES.mission))
+        script.hear(m.CommandAck(176, 0), after_s=0.1)
+        assert script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.hold), after_s=1.0) == []
+        assert not script.machine.is_done
+        assert script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.hold), after_s=1.0) == []
+        assert (script.machine.is_left, script.machine.is_granted) == (True, False)
+        assert script.machine.result_name == "accepted, but not shown by its heartbeat"
+
+    def test_what_was_not_answered_is_said_again(self):
+        script = Script(ModeSwitch(ON_1_17, PX4_MODES.mission))
+        (again,) = script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.hold), after_s=1.0)
+        assert (again.confirmation, again.param3) == (1, 4.0)
+
     def test_a_refusal_is_believed(self):
         script = Script(ModeSwitch(ON_1_18, PX4_MODES.mission))
         script.hear(m.CommandAck(176, 1))
@@ -364,6 +380,24 @@ class TestModes:
         assert not watch.is_active(1.0)
         watch.receive(m.Heartbeat(10, 12, 157, 10), 1.0)  # ArduPilot's AUTO is none here
         assert not watch.is_active(1.0)
+
+
+class TestFirstItem:
+    def test_it_is_asked_for_until_it_is_told(self):
+        script = Script(BeginAtFirstItem(ON_1_17))
+        assert script.sent == [m.MissionSetCurrent(1, 1, 0), m.CommandLong(1, 1, 512, param1=42.0)]
+        assert script.hear(m.MissionCurrent(3, 6, 4)) == []
+        script.pass_time(0.5)
+        assert len(script.sent) == 4
+        script.hear(m.MissionCurrent(0, 6, 2))
+        assert script.machine.is_done
+
+    def test_it_goes_on_without_an_answer(self):
+        """1.18 keeps it until the mission is begun, and tells the old number until then."""
+        script = Script(BeginAtFirstItem(ON_1_18))
+        script.pass_time(2.0)
+        assert script.machine.is_done
+        assert len([one for one in script.sent if isinstance(one, m.MissionSetCurrent)]) == 4
 
 
 class TestParameters:

@@ -88,24 +88,11 @@ def look_at_plan(
         raise
     except MissionError as error:
         took_s = clock() - begun_s
-        view = no_route_view(
-            error, situation, request, lambda: _widest_plan(situation, request, should_stop), took_s=took_s
-        )
-        return Looked(view, request)
+        return Looked(no_route_view(error, situation, request, should_stop, took_s=took_s), request)
     took_s = clock() - begun_s
     return Looked(
         plan_view(planned, situation, request, took_s=round(took_s, 4)), request, planned.items, planned
     )
-
-
-def _widest_plan(situation: Situation, request: Request, should_stop: Callable[[], bool]) -> Plan | None:
-    """Return the widest route, where one can be driven; None where none can, or it takes long."""
-    try:
-        return make_plan(situation, replace(request, clearance_m=None, widest=True), should_stop=should_stop)
-    except PlanStoppedError:
-        raise
-    except MissionError:
-        return None
 
 
 def look_at_mission(

@@ -312,10 +312,12 @@ class ConsoleRoutes:
         """Return the backups that may be put back."""
         return answer(self._hub.backend.backups())
 
-    async def after(self, _request: Request) -> Response:
+    async def after(self, request: Request) -> Response:
         """Return the newest drive, against what was promised."""
-        found = self._hub.backend.after()
-        return answer(found)
+        backend = self._hub.backend
+        return answer(
+            await self._hub.jobs.run(self._purpose(request, "after"), lambda _stop: backend.after())
+        )
 
     async def replay(self, request: Request) -> Response:
         """Return the sections of a log at a time."""
@@ -533,12 +535,12 @@ class ConsoleRoutes:
 
     async def take_control(self, request: Request) -> Response:
         """Let the page have control."""
-        self._hub.take_control(_page_id(request.headers.get("x-page-id")))
+        await self._hub.take_control(_page_id(request.headers.get("x-page-id")))
         return answer(TakenUp())
 
     async def give_control(self, request: Request) -> Response:
         """Take control back from the page."""
-        self._hub.give_control(_page_id(request.headers.get("x-page-id")))
+        await self._hub.give_control(_page_id(request.headers.get("x-page-id")))
         return answer(TakenUp())
 
     # The WebSocket
@@ -678,6 +680,7 @@ class _Gate:
 
     def __init__(self, app: ASGIApp, hub: Hub, tiles: str) -> None:
         self._app = app
+        self._hub = hub
         self._access = hub.access
         self._tiles = tiles
 
@@ -700,6 +703,7 @@ class _Gate:
         if problem is not None:
             await failure(problem, status)(scope, receive, with_headers)
             return
+        self._hub.control.note_seen(headers.get("x-page-id", ""), self._hub.clock())
         await self._app(scope, receive, with_headers)
 
     def _with_headers(self, send: Send, headers: Mapping[str, str]) -> Send:

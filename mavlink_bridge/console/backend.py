@@ -42,7 +42,7 @@ class PageBackend(Protocol):
         ...
 
     def after(self) -> AfterView | None:
-        """Return what the newest drive was, against what was promised."""
+        """Return what the newest drive was, against what was promised; asked beside the loop, for it takes a while."""
         ...
 
     def at(self, time_s: float) -> dict[str, Any] | None:

@@ -54,10 +54,12 @@ class ControlDesk:
         if self._holder != page_id:
             self._holder, self._since_s = page_id, now_s
 
-    def give(self, page_id: str) -> None:
-        """Leave control, where the page holds it."""
-        if self._holder == page_id:
-            self._holder = self._since_s = None
+    def give(self, page_id: str) -> bool:
+        """Leave control, where the page holds it; return whether it did."""
+        if self._holder != page_id:
+            return False
+        self._holder = self._since_s = None
+        return True
 
     def may_write(self, page_id: str, now_s: float) -> bool:
         """Return whether a page may change things now; where nobody holds control it gets it by asking."""
@@ -66,10 +68,16 @@ class ControlDesk:
             self.take(page_id, now_s)
         return self._holder == page_id
 
+    def note_seen(self, page_id: str, now_s: float) -> None:
+        """Take notice that a page asks for something, whatever it is: one that is known is there, also where it is not connected just now."""
+        if page_id in self._pages:
+            self._pages[page_id].left_s = now_s
+
     def _note_seen(self, page_id: str, now_s: float) -> None:
-        """Take notice that a page asks for something: it is there, also where it is not connected just now."""
+        """Take notice that a page wants to change something, known or not."""
+        self._forget_gone(now_s)
         self.name_of(page_id)
-        self._pages[page_id].left_s = now_s
+        self.note_seen(page_id, now_s)
 
     def holder(self, now_s: float) -> str | None:
         """Return the public name of the page that holds control; None where it is free."""

@@ -34,10 +34,13 @@ class Deed:
         The permissions it needs.
     needs_control : bool
         Whether only the page that holds control may ask for it.
+    only_stops : bool
+        Whether it only ends what is wanted: it is done though nobody waits for its answer any more.
     """
 
     needs: ClassVar[tuple[str, ...]] = ()
     needs_control: ClassVar[bool] = True
+    only_stops: ClassVar[bool] = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +96,21 @@ class Hold(Deed):
 
     needs: ClassVar[tuple[str, ...]] = ("drive",)
     needs_control: ClassVar[bool] = False
+    only_stops: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControl(Deed):
+    """Take notice that the page has control now: what another one waits for is not done any more."""
+
+    only_stops: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, slots=True)
+class GiveControl(Deed):
+    """Take notice that the page has given up control: what it waits for is not done any more."""
+
+    only_stops: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, slots=True)

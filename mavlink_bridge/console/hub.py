@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.console.board import MOST_EVENTS, Board
 from mavlink_bridge.console.control import ControlDesk
-from mavlink_bridge.console.deeds import Refusal, check_permitted
+from mavlink_bridge.console.deeds import GiveControl, Refusal, TakeControl, check_permitted
 from mavlink_bridge.console.jobs import Jobs
 from mavlink_bridge.console.view.sections import EventView
 from mavlink_bridge.console.wire import Problem
@@ -65,6 +65,11 @@ class Hub:
         """What pages may do."""
         can: Permissions = self.board.sections["server"].can
         return can
+
+    @property
+    def is_live(self) -> bool:
+        """Whether there is a vehicle behind it."""
+        return self.board.sections["server"].source in ("live", "demo")
 
     # From the bridge's thread
 
@@ -135,19 +140,24 @@ class Hub:
         )
         self.wake()
 
-    def take_control(self, page_id: str) -> None:
-        """Let a page have control, and tell all."""
+    async def take_control(self, page_id: str) -> None:
+        """Let a page have control, tell all, and do nothing any more of what the page before it waits for."""
         before, now_s = self.control.holder(self.clock()), self.clock()
         self.control.take(page_id, now_s)
         name = self.control.name_of(page_id)
         if name != before:
             self.tell(f"{name} took control" + (f" from {before}" if before else ""), "notice")
         self.show_control()
+        if self.is_live:
+            await self.backend.do(TakeControl(), name)
 
-    def give_control(self, page_id: str) -> None:
-        """Take control back from a page."""
-        self.control.give(page_id)
+    async def give_control(self, page_id: str) -> None:
+        """Take control back from a page, and do nothing any more of what it waits for."""
+        if not self.control.give(page_id):
+            return
         self.show_control()
+        if self.is_live:
+            await self.backend.do(GiveControl(), self.control.name_of(page_id))
 
     def keep(self, looked: Looked) -> None:
         """Remember a plan that was looked at, so that it can be asked for by its id."""

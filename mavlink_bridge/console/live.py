@@ -66,7 +66,7 @@ class LiveBackend:
         self._director = director
         self._asked: deque[_Asked] = deque()
         self.desk: LiveDesk | None = None
-        self.newest_after: AfterView | None = None
+        self.log = DriveLog()
 
     def situation(self) -> Situation:
         """Return what is known now."""
@@ -100,10 +100,10 @@ class LiveBackend:
         batch = [self._asked.popleft() for _ in range(len(self._asked))]
         holds = [index for index, asked in enumerate(batch) if isinstance(asked.deed, Hold)]
         for index, asked in enumerate(batch):
-            is_hold = index in holds
-            if self.desk is None or (asked.answer.cancelled() and not is_hold):
-                continue  # a HOLD is done though nobody waits for its answer any more
-            if not is_hold and holds and index < holds[-1]:
+            only_stops = asked.deed.only_stops
+            if self.desk is None or (asked.answer.cancelled() and not only_stops):
+                continue
+            if not only_stops and holds and index < holds[-1]:
                 _tell(asked, asked.answer.set_exception, not_now("HOLD came after it: nothing was sent"))
                 continue
             try:
@@ -121,7 +121,7 @@ class LiveBackend:
 
     def after(self) -> AfterView | None:
         """Return the newest drive against what was promised."""
-        return self.newest_after
+        return after_view(self.log.so_far())
 
     def at(self, time_s: float) -> dict[str, Any] | None:  # noqa: ARG002 - as the others
         """Return None: this is no replay."""
@@ -164,7 +164,7 @@ class LiveConsole:
         self._instruments = Instruments()
         self._drive = DriveShown()
         self._track = Track()
-        self._log = DriveLog()
+        self._log = backend.log
         self._hub: Hub | None = None
         self._due_s = 0.0
         self._rows: list[Any] = []
@@ -214,8 +214,6 @@ class LiveConsole:
         """Take an event of the director."""
         if event.name is not EventName.PROGRESS:
             self._events.append(event_view(event))
-        if event.name is EventName.ARRIVED:
-            self._tell_after()
 
     def note(self, text: str, severity: str) -> None:
         """Take what is no event of the director, with its severity."""
@@ -373,17 +371,6 @@ class LiveConsole:
 
     def _make_no_route(self, trouble: MissionError, situation: Situation, request: Request) -> None:
         self._post(plan=replace(no_route_view(trouble, situation, request), by="director"))
-
-    def _tell_after(self) -> None:
-        """Have the drive that has ended compared with what was promised."""
-        taken = self._log.take()
-        if taken is None:
-            return
-
-        def make() -> None:
-            self._backend.newest_after = after_view(taken)
-
-        self._drawer.want("after", make)
 
     def _post(self, **sections: Any) -> None:  # noqa: ANN401 - whichever
         if self._hub is not None:

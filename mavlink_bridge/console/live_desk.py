@@ -75,6 +75,7 @@ class _List:
     kind: MissionType
     items: tuple[MissionItem, ...]
     until_s: float
+    page: str
     restored: Any = None
 
 
@@ -114,6 +115,7 @@ class LiveDesk:
         self._tell = tell
         self._wanted: _Wanted | None = None
         self._list: _List | None = None
+        self._word_of = ""  # the page that has given the word to drive last
         self._driven: Request | None = None
         self._is_linked = True
         self.hold_shown = HoldShown()
@@ -127,6 +129,8 @@ class LiveDesk:
             deeds.Resume: self._resume,
             deeds.Blocked: self._blocked,
             deeds.ClearBlocked: self._clear_blocked,
+            deeds.TakeControl: self._take_control,
+            deeds.GiveControl: self._give_control,
         }
 
     @property
@@ -142,6 +146,8 @@ class LiveDesk:
         Refusal
             Not as things are.
         """
+        if deed.needs_control:
+            self._drop_wishes(lambda one: one != page, f"{page} has control now", now_s)
         return self._deeds[type(deed)](deed, page, now_s)
 
     def handle_timer(self, now_s: float) -> None:
@@ -163,6 +169,31 @@ class LiveDesk:
     def forget_wishes(self) -> None:
         """Do nothing any more that waits."""
         self._wanted = self._list = None
+
+    # Control
+
+    def _take_control(self, _deed: deeds.TakeControl, _page: str, _now_s: float) -> str:
+        return ""
+
+    def _give_control(self, _deed: deeds.GiveControl, page: str, now_s: float) -> str:
+        self._drop_wishes(lambda one: one == page, f"{page} has given up control", now_s)
+        return ""
+
+    def _drop_wishes(self, is_meant: Callable[[str], bool], why: str, now_s: float) -> None:
+        """Do nothing any more that pages wait for which have control no more. An upload or a drive that has begun goes on."""
+        if self._wanted is not None and is_meant(self._wanted.page):
+            what = "drive on" if self._wanted.drives else "upload"
+            self._tell(f"{why}: the {what} that {self._wanted.page} waited for is not done", "warning")
+            self._wanted = None
+        if self._list is not None and is_meant(self._list.page):
+            self._tell(f"{why}: the upload that {self._list.page} waited for is not done", "warning")
+            self._list = None
+        if self._word_of and is_meant(self._word_of):
+            if self._director.awaits_start:
+                self._tell(f"{why}: the start that {self._word_of} waited for is not done", "warning")
+            self._journal("withhold", now_s)
+            self._director.withhold_drive(now_s)
+            self._word_of = ""
 
     # Driving
 
@@ -198,9 +229,13 @@ class LiveDesk:
             )
         self._check_free()
         self._tell(f"{page} starts the drive", "notice")
-        self._journal("drive", now_s)
-        director.start_drive(now_s)
+        self._start_drive(page, now_s)
         return "starting"
+
+    def _start_drive(self, page: str, now_s: float) -> None:
+        self._word_of = page
+        self._journal("drive", now_s)
+        self._director.start_drive(now_s)
 
     def _resume(self, _deed: deeds.Resume, page: str, now_s: float) -> str:
         request = self._driven
@@ -242,12 +277,12 @@ class LiveDesk:
                 Problem(kind="not_found", message="that plan is not known any more", advice="plan again"), 404
             )
         if looked.request is None:
-            return self._upload_mission(looked, now_s)
+            return self._upload_mission(looked, page, now_s)
         self._wanted = _Wanted(looked.plan, None, page)
         self._request(looked.request, now_s)
         return "the same plan is made from where the rover is now, and uploaded"
 
-    def _upload_mission(self, looked: Looked, now_s: float) -> str:
+    def _upload_mission(self, looked: Looked, page: str, now_s: float) -> str:
         """Write a mission that was checked or repaired: a file's, or waypoints of the page."""
         peer = self._director.peer
         assert looked.plan is not None
@@ -262,13 +297,13 @@ class LiveDesk:
             )
         home = looked.plan.home or looked.plan.start
         return self._queue(
-            MissionType.MISSION, peer.autopilot.lists.form.mission_of(looked.items, home), now_s
+            MissionType.MISSION, peer.autopilot.lists.form.mission_of(looked.items, home), page, now_s
         )
 
-    def _upload_fence(self, deed: deeds.UploadFence, _page: str, now_s: float) -> str:
-        return self._queue(MissionType.FENCE, fence_to_items(deed.fence), now_s)
+    def _upload_fence(self, deed: deeds.UploadFence, page: str, now_s: float) -> str:
+        return self._queue(MissionType.FENCE, fence_to_items(deed.fence), page, now_s)
 
-    def _restore(self, deed: deeds.Restore, _page: str, now_s: float) -> str:
+    def _restore(self, deed: deeds.Restore, page: str, now_s: float) -> str:
         vehicle = self._vehicle()
         try:
             backup = self._store.named(deed.name)
@@ -279,12 +314,13 @@ class LiveDesk:
                 f"that backup is of {backup.vehicle}, which cannot be shown to be this vehicle",
                 f"on the command line: pbpp upload --restore {backup.path} --other-vehicle",
             )
-        return self._queue(backup.mission_type, backup.items, now_s, backup.path)
+        return self._queue(backup.mission_type, backup.items, page, now_s, backup.path)
 
     def _queue(
         self,
         kind: MissionType,
         items: tuple[MissionItem, ...],
+        page: str,
         now_s: float,
         restored: Any = None,  # noqa: ANN401 - a path or None
     ) -> str:
@@ -294,7 +330,7 @@ class LiveDesk:
             raise not_now("the vehicle is not known yet")
         if director.state in AT_WORK or director.state is State.PLANNING:
             raise not_now(f"the bridge is at work: {director.state}", "HOLD first, or wait")
-        self._list = _List(kind, items, now_s + _LIST_PATIENCE_S, restored)
+        self._list = _List(kind, items, now_s + _LIST_PATIENCE_S, page, restored)
         self._go_on_with_list(now_s)
         return f"uploading the {kind.name.lower()}"
 
@@ -350,8 +386,7 @@ class LiveDesk:
         self._journal("confirm", now_s)
         director.confirm(now_s)
         if wanted.drives:
-            self._journal("drive", now_s)
-            director.start_drive(now_s)
+            self._start_drive(wanted.page, now_s)
 
     # Obstacles
 

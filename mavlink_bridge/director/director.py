@@ -273,6 +273,15 @@ class Director:
         """Take the operator's word to drive: what is verified now, or once it is. A new target takes it back."""
         self._heed(self._parts.starter.begin_on_word(now_s), now_s)
 
+    @property
+    def awaits_start(self) -> bool:
+        """Whether a word to drive was given, and `withhold_drive` would still keep the vehicle where it is."""
+        return self._parts.starter.awaits_start
+
+    def withhold_drive(self, now_s: float) -> None:
+        """Take the word to drive back: what has not begun does not begin. Once AUTO was sent, only `hold` stops the vehicle; a way home goes on."""
+        self._heed(self._parts.starter.withhold(), now_s)
+
     def hold(self, reason: str, now_s: float) -> None:
         """Stop the vehicle because a person asks for it, and let go of all that was wanted; ignored without orders to drive, and before a vehicle was found.
 

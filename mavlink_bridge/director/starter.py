@@ -44,7 +44,7 @@ class Starter(Part):
     Attributes
     ----------
     is_told : bool
-        Whether a person has given the word to drive what is verified.
+        Whether a person has given the word to drive what is verified: good for one start, also for one that fails.
     """
 
     def __init__(
@@ -69,9 +69,18 @@ class Starter(Part):
     @property
     def may_begin(self) -> bool:
         """Whether a verified mission is driven now: at once, on a person's word where that is waited for, and a way home without one."""
-        orders, target = self.core.orders, self.core.target
-        is_home = target is not None and target.is_home
-        return orders.drive and (not orders.starts_on_word or self.is_told or is_home)
+        orders = self.core.orders
+        return orders.drive and (not orders.starts_on_word or self.is_told or self._is_home)
+
+    @property
+    def _is_home(self) -> bool:
+        target = self.core.target
+        return target is not None and target.is_home
+
+    @property
+    def awaits_start(self) -> bool:
+        """Whether the word was given, and the vehicle was not switched to AUTO on it yet; a way home needs none."""
+        return self.is_told and not self._is_home
 
     def begin_on_word(self, now_s: float) -> Sequence[Signal]:
         """Return that a person gives the word to drive: now, or once the mission is verified; one that the vehicle has refused is judged again first."""
@@ -80,6 +89,17 @@ class Starter(Part):
             return self._fence.verified(now_s, may_begin=self.may_begin)
         is_ready = self.core.state in ON_VEHICLE and not self._fence.is_waiting
         return [Cue.DRIVE] if is_ready and self.may_begin else []
+
+    def withhold(self) -> Sequence[Signal]:
+        """Take the word back, and return that the mission waits again that was to be driven."""
+        is_starting = self.awaits_start and self.core.state is State.STARTING
+        self.is_told = False
+        if not is_starting:
+            return []
+        self.core.steps.clear()
+        self._adopter.forget()
+        self._driver.stand_by()
+        return [Cue.RENEWED]
 
     def begin(self, now_s: float) -> Sequence[Signal]:
         """Begin the drive; a vehicle that still rolls to where it was expected to stand is waited for."""
@@ -156,6 +176,7 @@ class Starter(Part):
 
     def _give_up(self, trouble: BridgeError, now_s: float) -> Sequence[Signal]:
         """Return that the drive is not begun."""
+        self.is_told = False
         self._adopter.forget()
         self._driver.stand_by()
         self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
@@ -196,6 +217,7 @@ class Starter(Part):
     def _switch_to_auto(self, now_s: float) -> None:
         core, situation = self.core, self.core.situation
         assert core.peer is not None
+        self.is_told = False
         self._halter.may_be_in_auto = True
         core.operator.expect(core.modes.mission, {situation.mode}, is_armed=bool(situation.armed))
         core.steps.run([step(ModeSwitch(core.peer, core.modes.mission), self._in_auto)], now_s)
@@ -246,6 +268,7 @@ class Starter(Part):
         return self._failed(Command(outcome.command).name, result, texts, now_s)
 
     def _failed(self, name: str, result: str, texts: str, now_s: float) -> Sequence[Signal]:
+        self.is_told = False
         self.core.steps.clear()
         self._adopter.forget()
         self._tell_failed(name, result, (), now_s)

@@ -44,7 +44,7 @@ class Call:
     time_s : float
         Its time.
     name : str
-        Which call: ``start``, ``timer``, ``target``, ``request``, ``obstacle``, ``clear``, ``confirm``, ``drive``, ``hold``, ``suspect``, ``plan_made``, ``ways_made``, ``backup_stored``,
+        Which call: ``start``, ``timer``, ``target``, ``request``, ``obstacle``, ``clear``, ``confirm``, ``drive``, ``withhold``, ``hold``, ``suspect``, ``plan_made``, ``ways_made``, ``backup_stored``,
         ``backup_failed``, ``in_use``, ``note_stored`` or ``note_failed``.
     target : LatLon, optional
         The target that was typed, or where the obstacle is.

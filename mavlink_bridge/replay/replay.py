@@ -38,6 +38,7 @@ _PLAIN_CALLS: dict[str, Callable[[Director, Call], None]] = {
     "confirm": lambda director, call: director.confirm(call.time_s),
     "drive": lambda director, call: director.start_drive(call.time_s),
     "suspect": lambda director, _call: director.suspect_lists(),
+    "withhold": lambda director, call: director.withhold_drive(call.time_s),
     "hold": lambda director, call: director.hold(call.text, call.time_s),
 }
 _NOTED = ("note_stored", "note_failed")

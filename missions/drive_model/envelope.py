@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
+from missions.drive_model.speeds import speeds_along_mps
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
+
+    from missions.drive_model.legs_and_corners import DrivePlan
 
 # Chords in a quarter circle of a buffered band, which is widened so that they lie outside the circle
 QUARTER_SEGMENTS = 8
@@ -100,6 +104,8 @@ class Envelope:
     legs : tuple of Leg
     arrivals_s : ndarray of float, shape (n,)
         When the rover passes each point, from its start on.
+    motion : DrivePlan
+        The legs and corners that tell these times.
     """
 
     points: NDArray[np.float64]
@@ -109,11 +115,16 @@ class Envelope:
     corners: tuple[Corner, ...]
     legs: tuple[Leg, ...]
     arrivals_s: NDArray[np.float64]
+    motion: DrivePlan
 
     @property
     def duration_s(self) -> float:
         """The time from the start to rest at the last point."""
         return float(self.arrivals_s[-1])
+
+    def speeds_mps(self, along_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the predicted speed at places so far along the lines through the points, shape (m,)."""
+        return speeds_along_mps(self.motion, self.points, along_m)
 
     @cached_property
     def area(self) -> BaseGeometry:

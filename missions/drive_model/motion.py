@@ -56,6 +56,17 @@ class Ramp(NamedTuple):
             return speed_mps * (time_s - half_s) + _first_half_m(jerk_mps3, jerk_s, rest_s)
         return _first_half_m(jerk_mps3, jerk_s, time_s)
 
+    def speed_at_mps(self, time_s: float) -> float:
+        """Return the speed after a time from rest; beyond the ramp it stays."""
+        if time_s > self.duration_s / 2:
+            return self.speed_mps - self._early_mps(max(self.duration_s - time_s, 0.0))
+        return self._early_mps(max(time_s, 0.0))
+
+    def _early_mps(self, time_s: float) -> float:
+        """Return the speed in the first half of the ramp."""
+        jerking_s = min(time_s, self.jerk_s)
+        return self.jerk_mps3 * jerking_s * (time_s - jerking_s / 2)
+
     def accel_at_mps2(self, time_s: float) -> float:
         """Return the acceleration in the first half of the ramp."""
         return self.jerk_mps3 * min(time_s, self.jerk_s)
@@ -118,6 +129,10 @@ class LegProfile(NamedTuple):
         if time_s > self.duration_s / 2:
             return self.length_m - self.ramp.travelled_m(self.duration_s - time_s)
         return self.ramp.travelled_m(time_s)
+
+    def speed_at_mps(self, time_s: float) -> float:
+        """Return the speed after a time since the leg's start."""
+        return self.ramp.speed_at_mps(min(time_s, self.duration_s - time_s))
 
 
 def all_travelled_m(

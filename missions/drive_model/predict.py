@@ -165,6 +165,7 @@ class Drive:
             corners=tuple(told_corner(self.plans, number) for number in range(len(plan.corners))),
             legs=tuple(told_leg(self.plans, number) for number in range(len(plan.legs))),
             arrivals_s=self.arrivals_s,
+            motion=plan,
         )
 
 

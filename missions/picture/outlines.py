@@ -86,15 +86,15 @@ class RouteSample:
         The drawn line's distance to the nearest fence there; infinite without a fence, 0 on forbidden ground.
     driven_m : float
         The same of the predicted corridor, across the line there.
-    top_speed_mps : float
-        The highest speed that is predicted on the leg.
+    speed_mps : float
+        The speed that the drive model expects there.
     """
 
     along_m: float
     time_s: float
     drawn_m: float
     driven_m: float
-    top_speed_mps: float
+    speed_mps: float
 
 
 def route_samples(plan: Plan) -> tuple[RouteSample, ...]:
@@ -112,7 +112,7 @@ def route_samples(plan: Plan) -> tuple[RouteSample, ...]:
     drawn_m = _room_m(plan.ground, places)
     driven_m = np.minimum(drawn_m, _room_m(plan.ground, _sections(plan, places, leg)))
     times_s = np.interp(along_m, marks_m, plan.envelope.arrivals_s)
-    speeds_mps = _top_speeds_mps(plan, len(lengths_m))[leg]
+    speeds_mps = plan.envelope.speeds_mps(along_m)
     columns = (along_m, times_s, drawn_m, driven_m, speeds_mps)
     return tuple(RouteSample(*map(float, row)) for row in zip(*columns, strict=True))
 
@@ -148,14 +148,6 @@ def _part_at(section: BaseGeometry, place: BaseGeometry) -> BaseGeometry:
         return place if section.is_empty else section
     nearest: BaseGeometry = parts[int(np.argmin(shapely.distance(parts, place)))]
     return nearest
-
-
-def _top_speeds_mps(plan: Plan, count: int) -> NDArray[np.float64]:
-    """Return the highest predicted speed on each leg of the path; legs of no length have none of their own."""
-    speeds = np.zeros(count)
-    for one in plan.envelope.legs:
-        speeds[min(one.first, count - 1)] = one.top_speed_mps
-    return speeds
 
 
 def _on_earth(frame: LocalFrame, points: NDArray[np.float64]) -> tuple[LatLon, ...]:

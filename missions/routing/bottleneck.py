@@ -15,8 +15,14 @@ from missions.geo import LocalPoint
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from numpy.typing import NDArray
+
     from missions.geo import LatLon
     from missions.ground.ground import Ground
+
+
+_LESS_M = (0.0, 0.02, 0.1, 0.5)
+"""Less than the widest clearance, one after the other: straight legs turn round corners of fences at a little more than they keep. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,25 @@ def narrowest_place(
     middle = np.mean(way.points, axis=0)
     at = ground.frame.to_lat_lon(LocalPoint(float(middle[0]), float(middle[1])))
     return NarrowestPlace(way.clearance_m, tuple(_part_name(ground, part) for part in way.parts), at)
+
+
+def widest_line(
+    ground: Ground,
+    start: LocalPoint,
+    goal: LocalPoint,
+    place: NarrowestPlace,
+    should_stop: Callable[[], bool] | None = None,
+) -> NDArray[np.float64] | None:
+    """Return the shortest straight legs by a narrowest place that keep what can be kept there, shape (n, 2); None where none could be laid."""
+    inclusions, exclusions = ground.areas(ZoneKind.INCLUSION), ground.areas(ZoneKind.EXCLUSION)
+    for less_m in _LESS_M:
+        clearance_m = max(0.0, place.clearance_m - less_m)
+        planner = pbpp.Planner(inclusions, exclusions, clearance_m=clearance_m, union=ground.union)
+        try:
+            return planner.plan(start, goal, should_stop=should_stop).points
+        except (pbpp.NoPathError, pbpp.StartBlockedError, pbpp.GoalBlockedError):
+            continue
+    return None
 
 
 def widest_clearance_m(

@@ -24,6 +24,7 @@ export class Actions {
     this.tell = tell;
     /** @type {Zone[] | null} */
     this.sentZones = null;
+    this.hasGiven = false; // control, by a person here
     store.watch(["upload"], () => this.sentZones && this.seeTransfer());
     this.history = new History(/** @type {Doc} */ (EMPTY), (doc) => {
       const zone = store.state.zone;
@@ -306,6 +307,7 @@ export class Actions {
   }
 
   giveControl() {
+    this.hasGiven = true;
     return this.attempt(texts.top.control.give, () => post("/api/control/give"));
   }
 

@@ -115,6 +115,23 @@ function panels() {
   return tabs(store, isServed ? all : still.flatMap((name) => all.filter(([one]) => one === name)));
 }
 
+/** Who loses control is told, and why: by another page, or because this one was gone for too long. */
+function watchControl() {
+  let isMine = false;
+  store.watch(["control", "page", "isConnected"], ({ control, page, isConnected }) => {
+    if (!isConnected) {
+      return; // what is known is old
+    }
+    const words = texts.top.control;
+    const isStill = control.holder !== null && control.holder === page;
+    if (isMine && !isStill && !actions.hasGiven) {
+      tell(control.holder ? words.taken(control.holder) : words.lost, true);
+    }
+    actions.hasGiven &&= isStill;
+    isMine = isStill;
+  });
+}
+
 /** Keys that act everywhere but in a text. @param {KeyboardEvent} event */
 function press(event) {
   if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !typesText(event.target)) {
@@ -211,6 +228,7 @@ async function run() {
     return;
   }
   buildPage();
+  watchControl();
   document.addEventListener("keydown", press);
   acceptDrops((file) => actions.open(file));
   store.set({ doc: EMPTY });

@@ -31,6 +31,11 @@ export function svg(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** How large the page's letters are against the usual 16 px: on a large screen, and for who has set larger ones. */
+export function letterScale() {
+  return parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+}
+
 /**
  * Put other children into an element.
  * @param {Element} element

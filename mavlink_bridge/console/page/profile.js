@@ -1,16 +1,17 @@
 /** Clearance and speed along the route, with the rover's place in it. */
 
-import { fill, h, say, svg } from "./dom.js";
+import { fill, h, letterScale, say, svg } from "./dom.js";
 import { texts } from "./texts.js";
 
 /** @typedef {import("./types.js").PageState} PageState */
 /** @typedef {import("./types.js").ProfileSample} Sample */
 
-const HEIGHT = 110;
-const LEFT = 40;
-const RIGHT = 40;
-const TOP = 10;
-const BOTTOM = 20;
+const SCALE = letterScale(); // its numbers take so much room
+const HEIGHT = 110 * SCALE;
+const LEFT = 40 * SCALE;
+const RIGHT = 40 * SCALE;
+const TOP = 10 * SCALE;
+const BOTTOM = 20 * SCALE;
 const MOST_CLEAR_M = 10; // more room than this is not told apart: what matters is near the fence
 
 /** @param {import("./store.js").Store<PageState>} store */
@@ -110,7 +111,7 @@ function chart(samples, asked_m, width, x) {
     asked_m !== null && asked_m <= top_m && svg("line", { class: "profile-asked", x1: LEFT, x2: width - RIGHT, y1: y(asked_m, top_m), y2: y(asked_m, top_m) }),
     svg("path", { class: "profile-speed", d: line((one) => one.speed_mps, top_mps) }),
     svg("path", { class: "profile-axis", d: `M${LEFT} ${TOP}V${base}H${width - RIGHT}V${TOP}` }),
-    label(LEFT - 4, TOP + 8, `${top_m} m`, "end"), label(LEFT - 4, base, "0", "end"), label(width - RIGHT + 4, TOP + 8, `${top_mps} m/s`, "start"), label(width - RIGHT + 4, base, "0", "start"),
+    label(LEFT - 4, TOP + 8 * SCALE, `${top_m} m`, "end"), label(LEFT - 4, base, "0", "end"), label(width - RIGHT + 4, TOP + 8 * SCALE, `${top_mps} m/s`, "start"), label(width - RIGHT + 4, base, "0", "start"),
     label(LEFT, HEIGHT - 5, "0 m", "start"), label(width - RIGHT, HEIGHT - 5, `${end_m.toFixed(0)} m`, "end"),
   ];
 }

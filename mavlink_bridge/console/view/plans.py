@@ -7,11 +7,14 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mavlink_bridge.console.view.fields import asked_view, identity
 from mavlink_bridge.console.view.places import finite, line, multi_polygon, place, places
 from mavlink_bridge.console.view.sections import (
     Blocker,
     LegView,
+    LineString,
     Narrowest,
     NoRouteView,
     PlanView,
@@ -21,14 +24,14 @@ from mavlink_bridge.console.view.sections import (
 )
 from missions.checking.check import check_mission
 from missions.checking.holding import hold_info
-from missions.errors import MissionError
+from missions.errors import MissionError, PlanStoppedError
 from missions.geo import LatLon, distance_m
 from missions.ground.from_situation import ground_for, route_ends
 from missions.picture.outlines import line_on_earth, outline, route_samples
 from missions.picture.plans import plan_scene
 from missions.promise import known_vehicle
 from missions.request import GoTo, conditions
-from missions.routing.bottleneck import NarrowestPlace, narrowest_place
+from missions.routing.bottleneck import NarrowestPlace, narrowest_place, widest_line
 from missions.situation import Mission, Situation
 from missions.words import metres
 
@@ -166,7 +169,7 @@ def _route(planned: Plan) -> dict[str, Any]:
                 round(one.time_s, 1),
                 finite(one.drawn_m, 2),
                 finite(one.driven_m, 2),
-                round(one.top_speed_mps, 2),
+                round(one.speed_mps, 2),
             )
             for one in route_samples(planned)
         ),
@@ -275,7 +278,7 @@ def no_route_view(
     error: MissionError,
     situation: Situation,
     request: Request,
-    widest_plan: Callable[[], Plan | None] = lambda: None,
+    should_stop: Callable[[], bool] | None = None,
     *,
     took_s: float | None = None,
 ) -> PlanView:
@@ -289,23 +292,24 @@ def no_route_view(
         What is known.
     request : Request
         What was asked.
-    widest_plan : callable
-        Plans the widest route; None where there is none. Called only where a wider one may exist.
+    should_stop : callable, optional
+        Asked now and then; True ends it.
     took_s : float, optional
         How long it took.
     """
     details = dict(error.details)
     advice = str(details.pop("advice", ""))
     ground, ends = _ground(situation, request)
-    narrow = _narrowest(ground, ends)
+    stop = PlanStoppedError.when(should_stop)
+    narrow = _narrowest(ground, ends, stop)
     widest = None
-    if narrow is not None and math.isfinite(narrow.clearance_m):
-        planned = widest_plan()
+    if ground is not None and narrow and math.isfinite(least_m := min(one.clearance_m for one in narrow)):
+        least = next(one for one in narrow if one.clearance_m == least_m)
         widest = WidestRoute(
-            round(_number(details.get("widest_m"), narrow.clearance_m), 4),
-            place(narrow.at) if narrow.at else None,
-            tuple(dict.fromkeys(narrow.between)),
-            line(planned.path) if planned is not None else None,
+            round(_number(details.get("widest_m"), least_m), 4),
+            place(least.at) if least.at else None,
+            tuple(dict.fromkeys(least.between)),
+            _widest_path(ground, ends, narrow, stop),
         )
     named = _named(details)
     if not named and widest is not None:
@@ -337,14 +341,27 @@ def _ground(situation: Situation, request: Request) -> tuple[Ground | None, tupl
         return None, ()
 
 
-def _narrowest(ground: Ground | None, ends: tuple[LatLon, ...]) -> NarrowestPlace | None:
-    """Return the narrowest place of the widest route over all ends; None where there is no route at all."""
+def _narrowest(
+    ground: Ground | None, ends: tuple[LatLon, ...], stop: Callable[[], bool] | None
+) -> list[NarrowestPlace]:
+    """Return the narrowest places of the widest route over all ends, one for each; none where there is no route at all."""
     if ground is None:
-        return None
-    found = [
-        narrowest_place(ground, ground.frame.to_local(a), ground.frame.to_local(b)) for a, b in pairwise(ends)
-    ]
-    return None if None in found or not found else min(found, key=lambda one: one.clearance_m if one else 0.0)
+        return []
+    local = map(ground.frame.to_local, ends)
+    found = [narrowest_place(ground, a, b, stop) for a, b in pairwise(local)]
+    return [] if None in found else [one for one in found if one is not None]
+
+
+def _widest_path(
+    ground: Ground, ends: tuple[LatLon, ...], narrow: list[NarrowestPlace], stop: Callable[[], bool] | None
+) -> LineString | None:
+    """Return the straight legs of the widest route: to look at, so that nobody waits for one that can be driven."""
+    found = []
+    for (a, b), one in zip(pairwise(map(ground.frame.to_local, ends)), narrow, strict=True):
+        straight = np.array([a, b])
+        found.append(widest_line(ground, a, b, one, stop) if math.isfinite(one.clearance_m) else straight)
+    known = [one for one in found if one is not None]
+    return line(line_on_earth(ground.frame, np.concatenate(known))) if len(known) == len(found) else None
 
 
 def _named(details: dict[str, Any]) -> tuple[str, ...]:

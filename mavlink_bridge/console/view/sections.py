@@ -392,7 +392,7 @@ class Narrowest:
 
 @dataclass(frozen=True, slots=True)
 class ProfileSample:
-    """A place along the route: how far, when, the distance to the fence of line and corridor, and the highest speed predicted on that leg."""
+    """A place along the route: how far, when, the distance to the fence of line and corridor, and the predicted speed."""
 
     s_m: float
     time_s: float
@@ -593,11 +593,23 @@ class AfterSample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AfterView:
-    """What was driven against what was promised, of the newest drive."""
+class AfterPiece:
+    """What was driven of one plan, against what it promised.
+
+    Parameters
+    ----------
+    is_kept : bool
+        Whether no breach was counted and no position was nearer to the fence than was promised.
+    has_arrived : bool
+        Whether it went to its end; else it was stopped.
+    predicted_s, length_m : float or None
+        Of the whole plan, also where it was stopped.
+    """
 
     plan_id: str
     promised_m: float | None
+    is_kept: bool
+    has_arrived: bool
     least_m: float | None
     least_at: Place | None
     predicted_s: float | None
@@ -608,6 +620,40 @@ class AfterView:
     outside_max_m: float
     breaches: int
     profile: tuple[AfterSample, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AfterView:
+    """What was driven against what was promised, of the newest drive: from its first start to its end, or so far.
+
+    Parameters
+    ----------
+    plan_id : str
+        The plan that was driven last.
+    promised_m : float or None
+        The least that its plans promised; None where one of them promised nothing.
+    is_kept, has_arrived : bool
+        Whether each piece kept what its own plan promised; whether the last one went to its end.
+    predicted_s, length_m : float or None
+        Of the first plan; ``took_s`` counts from its start, and with it what the vehicle stood in between.
+    pieces : tuple of AfterPiece
+        One for each plan that was driven: after each HOLD with "Go on" there is one more.
+    """
+
+    plan_id: str
+    promised_m: float | None
+    is_kept: bool
+    has_arrived: bool
+    least_m: float | None
+    least_at: Place | None
+    predicted_s: float | None
+    took_s: float
+    driven_m: float
+    length_m: float
+    deviation_max_m: float
+    outside_max_m: float
+    breaches: int
+    pieces: tuple[AfterPiece, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

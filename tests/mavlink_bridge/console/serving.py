@@ -46,7 +46,8 @@ def files_hub(access: Access, can: Permissions | None = None, backend=None) -> H
     situation = read_situation(FIELDS / "maze-fence.waypoints")
     situation = replace(situation, pose=Known(Pose(START), None, "test"))
     request = Tour()
-    server = ServerView(version="1", run_id="r", source="files", source_name="maze", can=can or Permissions())
+    source = "files" if backend is None else "demo"
+    server = ServerView(version="1", run_id="r", source=source, source_name="maze", can=can or Permissions())
     sections = Sections(server=server, **field_sections(situation, request, "file"))
     return Hub(sections, backend or FilesBackend(situation, request), access, time.time)
 

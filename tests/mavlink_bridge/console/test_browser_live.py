@@ -141,7 +141,9 @@ def go_on(seen: Watched) -> None:
 
 def arrive(seen: Watched) -> None:
     expect(seen.page.locator("#part-drive .facts").first).to_contain_text("arrived", timeout=120_000)
-    expect(seen.page.get_by_text("The promise was kept")).to_be_visible()
+    expect(seen.page.get_by_text("The promise was kept", exact=False)).to_be_visible()
+    expect(seen.page.locator("table.pieces tbody tr")).to_have_count(2)  # before HOLD, and after it
+    expect(seen.page.locator("table.pieces")).to_contain_text("arrived")
     assert seen.accessible() == []
 
 
@@ -179,7 +181,10 @@ STEPS = [
         "Open **Drive** and press **Go on to the target** for a second. A new route is planned from where the rover stands, uploaded, verified and driven.",
         go_on,
     ),
-    ('Wait until the state is "arrived". Below stands what was driven against what was promised.', arrive),
+    (
+        'Wait until the state is "arrived". Below stands what was driven against what was promised, before HOLD and after it.',
+        arrive,
+    ),
 ]
 
 
@@ -267,6 +272,7 @@ def test_a_foreign_fence_a_cut_link_and_a_page_that_only_looks(browser: Browser,
             other.page.get_by_role("dialog").get_by_role("button", name="Take control").click()
             expect(other.page.get_by_text("This page holds control")).to_be_visible()
             expect(page.get_by_text("This page holds control")).to_be_hidden()
+            expect(page.get_by_text("page 2 took control: this page can only watch")).to_be_visible()
             close(seen, other)
     finally:
         rover.kill()

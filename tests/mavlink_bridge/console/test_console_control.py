@@ -48,6 +48,28 @@ def test_a_reload_keeps_control_and_a_page_that_is_gone_loses_it():
     assert desk.may_write(TWO, 20.0 + AWAY_S + 0.1)
 
 
+def test_a_page_that_still_asks_keeps_control_and_name_without_a_connection():
+    desk = ControlDesk()
+    desk.connect(ONE), desk.connect(TWO)
+    desk.take(ONE, 0.0)
+    desk.disconnect(ONE, 1.0)
+    for now_s in (9.0, 18.0, 27.0):  # it plans, and looks for backups
+        desk.note_seen(ONE, now_s)
+    desk.connect("c" * 12), desk.disconnect("c" * 12, 30.0)  # who has gone is forgotten
+    assert not desk.may_write(TWO, 30.0)
+    assert desk.connect(ONE) == "page 1"
+    assert desk.view(30.0).holder == "page 1"
+
+
+def test_a_page_that_was_never_heard_of_is_not_kept_for_asking():
+    desk = ControlDesk()
+    desk.note_seen(ONE, 0.0)
+    assert desk.connect(TWO) == "page 1"
+    for number in range(100):
+        desk.may_write(f"stranger-{number}", 20.0 * number)
+    assert len(desk._pages) <= 3
+
+
 def test_a_page_twice_connected_is_there_until_both_are_gone():
     desk = ControlDesk()
     desk.connect(ONE), desk.connect(ONE)

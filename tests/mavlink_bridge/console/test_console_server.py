@@ -393,7 +393,14 @@ def test_one_page_holds_control_and_every_page_may_hold_the_vehicle():
             assert texts == ["page 1 took control from page 2"]
         assert client.post("/api/control/give", headers=OTHER).status_code == 200
         assert client.post("/api/resume", headers=PAGE).status_code == 409
-    assert backend.deeds == [("Start", "page 2"), ("Hold", "page 1"), ("Resume", "page 2")]
+    # Who takes control or gives it up ends what was waited for: the vehicle's side is told.
+    assert backend.deeds == [
+        ("Start", "page 2"),
+        ("Hold", "page 1"),
+        ("TakeControl", "page 1"),
+        ("GiveControl", "page 1"),
+        ("Resume", "page 2"),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,14 @@ import time
 
 import pytest
 from console.serving import SteppedConsole
-from director.test_bridge_director import FAR, IN_BARN
+from director.test_bridge_director import FAR, IN_BARN, NEAR
 
 from mavlink_bridge.console import deeds
 from mavlink_bridge.console.deeds import Refusal
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
+from mavlink_bridge.console.view import driven
 from mavlink_bridge.console.view.instruments import Instruments
+from mavlink_bridge.console.view.plans import plan_id
 from mavlink_bridge.director import State
 from mavlink_bridge.mavlink import messages as m
 from missions.request import Tour
@@ -119,17 +121,69 @@ def test_a_page_sees_the_vehicle_its_fence_the_plan_and_the_drive(shown):
     shown.wait(0.5)
     assert not shown.pages.state["drive"].is_driving
     assert shown.pages.state["drive"].least_clearance_m >= 2.5  # stays to be seen
-    until_s = time.monotonic() + 150
-    while shown.backend.after() is None:
-        assert time.monotonic() < until_s
-        time.sleep(0.01)
     after = shown.backend.after()
+    assert (len(after.pieces), after.is_kept, after.has_arrived) == (1, True, True)
     assert after.least_m >= after.promised_m == 2.5
     assert after.outside_max_m == 0.0
     assert len(shown.pages.rows) > 100
     names = [event.name for event in shown.pages.events]
     assert "progress" not in names
     assert {"planned", "verified", "arrived", "statustext"} <= set(names)
+
+
+def test_a_drive_is_compared_whole_piece_by_piece_also_one_that_was_stopped(shown):
+    assert shown.backend.after() is None
+    shown.do(deeds.TakeTargets(Tour(targets=(FAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.director.confirm(shown.run.now_s)
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.do(deeds.Start(plan_id(shown.director.plan)))
+    shown.until(lambda: shown.director.drive is not None and shown.director.drive.driven_m > 20)
+    shown.do(deeds.Hold())
+    shown.wait(10.0)
+    first = shown.backend.after()  # so far: nobody has to arrive to know it
+    assert (len(first.pieces), first.is_kept, first.has_arrived) == (1, True, False)
+    assert first.driven_m > 15
+    shown.do(deeds.Resume())
+    shown.until(lambda: shown.director.state is State.ARRIVED, 200)
+    shown.wait(0.5)
+    after = shown.backend.after()
+    one, two = after.pieces
+    assert one.driven_m == pytest.approx(first.driven_m, abs=0.01)
+    assert (one.has_arrived, two.has_arrived, after.has_arrived) == (False, True, True)
+    assert after.driven_m == pytest.approx(one.driven_m + two.driven_m, abs=0.02)
+    assert after.least_m == min(one.least_m, two.least_m)
+    assert after.predicted_s == one.predicted_s
+    assert after.took_s > one.took_s + two.took_s + 5  # it stood in between
+    # Another target is another drive.
+    shown.do(deeds.TakeTargets(Tour(targets=(NEAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.director.confirm(shown.run.now_s)
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.do(deeds.Start(plan_id(shown.director.plan)))
+    shown.until(lambda: shown.director.drive is not None and shown.director.drive.driven_m > 2)
+    assert len(shown.backend.after().pieces) == 1
+
+
+def test_a_long_drive_is_compared_to_its_end_and_loses_no_clearance(shown, monkeypatch):
+    monkeypatch.setattr(driven, "_MOST_PLACES", 50)
+    shown.do(deeds.TakeTargets(Tour(targets=(FAR,), clearance_m=2.5)))
+    shown.until(lambda: shown.director.awaits_confirmation)
+    shown.director.confirm(shown.run.now_s)
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.do(deeds.Start(plan_id(shown.director.plan)))
+    shown.until(lambda: shown.director.state is State.DRIVING)
+    watch = shown.director.drive
+    shown.until(lambda: shown.director.state is State.ARRIVED, 200)
+    (piece,) = shown.backend.log.so_far()
+    assert 25 < len(piece.passed) <= 50
+    times_s = [one.time_s for one in piece.passed]
+    assert times_s == sorted(set(times_s))
+    assert piece.passed[-1].time_s == pytest.approx(shown.run.now_s, abs=2.0)
+    assert piece.least_m == watch.least_clearance_m
+    (view,) = shown.backend.after().pieces
+    assert view.least_m == pytest.approx(watch.least_clearance_m, abs=0.005)
+    assert view.driven_m == pytest.approx(watch.driven_m, rel=0.02)
 
 
 def test_why_there_is_no_route_is_shown_and_the_link_that_is_lost(shown):
@@ -243,6 +297,30 @@ def test_an_upload_between_two_looks_is_shown_all_the_same(shown):
     shown.console._due_s = 0.0
     shown.wait(0.3)
     assert (shown.pages.state["upload"].what, shown.pages.state["upload"].state) == ("mission", "verified")
+
+
+def test_what_only_stops_is_done_though_nobody_waits_for_its_answer(shown):
+    """A page that takes control and is gone before the bridge has heard it: what the other one waits for is not done all the same."""
+
+    async def ask():
+        wanted = asyncio.create_task(shown.backend.do(deeds.TakeTargets(Tour(targets=(FAR,))), "page 1"))
+        await asyncio.sleep(0)
+        shown.backend.take_asked(shown.run.now_s)
+        assert await wanted == "the bridge plans"
+        taken = asyncio.create_task(shown.backend.do(deeds.TakeControl(), "page 2"))
+        await asyncio.sleep(0)
+        taken.cancel()
+        await asyncio.sleep(0)
+        shown.backend.take_asked(shown.run.now_s)
+
+    done: list = []
+    own = shown.desk.do
+    shown.desk.do = lambda deed, page, now_s: (
+        done.append((type(deed).__name__, page)),
+        own(deed, page, now_s),
+    )[1]
+    asyncio.run(ask())
+    assert done == [("TakeTargets", "page 1"), ("TakeControl", "page 2")]
 
 
 def test_hold_is_done_though_its_page_does_not_wait_any_more_and_before_all_else(shown):

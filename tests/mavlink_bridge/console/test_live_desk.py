@@ -114,6 +114,78 @@ def test_hold_is_answered_by_what_the_vehicle_did_and_a_person_goes_on(tmp_path)
     assert console.run.last(EventName.ARRIVED).data["breaches"] == 0
 
 
+def gone_on(console) -> None:
+    """HOLD in a drive, and "Go on" of page 1."""
+    driving(console)
+    console.wait(8.0)
+    console.do(deeds.Hold())
+    console.until(
+        lambda: console.desk.hold_shown.view(console.director, console.run.now_s).state == "stopped", 20
+    )
+    console.do(deeds.Resume())
+
+
+@pytest.mark.parametrize("state", [State.PLANNING, State.UPLOADING, State.STARTING])
+def test_who_takes_control_ends_what_another_page_waits_for(tmp_path, state):
+    console = ready(tmp_path)
+    gone_on(console)
+    console.until(lambda: console.director.state is state)
+    console.do(deeds.TakeControl(), "page 1")  # its own: nothing changes
+    assert not any("not done" in text for text, _ in console.told)
+    console.do(deeds.TakeControl(), "page 2")
+    what = "start" if state is not State.PLANNING else "drive on"
+    assert console.told[-1] == (
+        f"page 2 has control now: the {what} that page 1 waited for is not done",
+        "warning",
+    )
+    console.wait(70.0)
+    assert console.director.state is (State.PROPOSED if state is State.PLANNING else State.VERIFIED)
+    assert console.director.situation.mode == Mode.HOLD
+    if state is State.PLANNING:
+        console.do(deeds.UploadPlan(plan_id(console.director.plan)), "page 2")
+        console.until(lambda: console.director.state is State.VERIFIED)
+    console.do(deeds.Start(plan_id(console.director.plan)), "page 2")
+    console.until(console.run.happened(EventName.ARRIVED), 200)
+
+
+def test_a_deed_of_the_next_page_ends_what_the_last_one_waits_for_and_so_does_giving_up(tmp_path):
+    """A page that left has lost control without anybody taking it: the first deed of another one tells."""
+    console = ready(tmp_path)
+    gone_on(console)
+    console.do(deeds.ClearBlocked(), "page 2")
+    assert "waited for is not done" in console.told[-1][0]
+    console.wait(70.0)
+    assert console.director.state is State.PROPOSED
+    console.do(deeds.Resume(), "page 2")
+    console.do(deeds.GiveControl(), "page 2")
+    assert (
+        "page 2 has given up control: the drive on that page 2 waited for is not done" in console.told[-1][0]
+    )
+    console.wait(70.0)
+    assert console.director.state is State.PROPOSED
+
+
+def test_a_drive_that_has_begun_and_an_upload_under_way_go_on_under_other_hands(tmp_path):
+    console = driving(ready(tmp_path))
+    console.do(deeds.TakeControl(), "page 2")
+    assert not any("not done" in text for text, _ in console.told)
+    console.until(console.run.happened(EventName.ARRIVED), 200)
+    console.do(deeds.UploadPlan("x", looked_at(console, replace(FAR_TOUR, targets=(NEAR,)))), "page 2")
+    console.until(lambda: console.director.state is State.UPLOADING)
+    console.do(deeds.TakeControl(), "page 1")
+    console.until(lambda: console.director.state is State.VERIFIED)
+
+
+def test_an_upload_that_is_still_planned_for_is_not_done_for_who_has_no_control(tmp_path):
+    console = ready(tmp_path)
+    console.do(deeds.UploadPlan("x", looked_at(console)))
+    console.do(deeds.TakeControl(), "page 2")
+    assert "the upload that page 1 waited for is not done" in console.told[-1][0]
+    console.wait(20.0)
+    assert console.director.state is State.PROPOSED
+    assert not console.run.vehicles[0].mission[1:]
+
+
 def test_a_px4_rover_is_started_once_its_fence_counts_held_and_driven_on(tmp_path):
     request = replace(FAR_TOUR, clearance_m=1.5)
     console = SteppedConsole(tmp_path, conductor=px4_conductor)

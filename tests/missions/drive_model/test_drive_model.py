@@ -23,7 +23,7 @@ from missions.fence import PolygonZone, ZoneKind
 from missions.formats import waypoints as waypoint_file
 from missions.geo import LatLon
 from missions.ground.frame import LocalFrame
-from missions.vehicle import Autopilot, Steering, Vehicle
+from missions.vehicle import Autopilot, Pursuit, Steering, Vehicle
 
 DATA = Path(__file__).parent / "data"
 ROVER = Vehicle(waypoint_radius_m=3.0, speed_mps=5.0)
@@ -196,6 +196,67 @@ def test_recorded_drives(name: str, fields: Path) -> None:
     fence = fence_lines(fields / f"{name[:4]}-fence.waypoints", frame)
     least_m = LineString(track).distance(fence)
     assert least_m - 0.75 <= foreseen.clearance_m(fence) <= least_m + 0.05
+
+
+# --- the speed along the lines ----------------------------------------------------------------------------------------------
+
+
+@given(
+    st.lists(st.floats(8, 60), min_size=1, max_size=5),
+    st.lists(turns, min_size=4, max_size=4),
+    vehicles,
+)
+def test_speeds_along_the_lines_take_as_long_as_the_legs_and_begin_and_end_at_rest(
+    legs_m: list[float], turns_deg: list[float], vehicle: Vehicle
+) -> None:
+    points = polyline(legs_m, turns_deg)
+    band = envelope(points, vehicle, heading_deg=0.0)
+    along_m = np.linspace(0.0, sum(legs_m), 400)
+    speeds_mps = band.speeds_mps(along_m)
+    assert speeds_mps.max() <= vehicle.speed_mps + 1e-9
+    assert speeds_mps.min() >= 0.0
+    assert (speeds_mps[0], speeds_mps[-1]) == pytest.approx((0.0, 0.0), abs=1e-6)
+    tops = [leg.top_speed_mps for leg in band.legs]
+    for corner in band.corners:
+        at_mps = float(band.speeds_mps(np.array([sum(legs_m[: corner.waypoint])]))[0])
+        assert at_mps <= max(tops[corner.waypoint - 1 : corner.waypoint + 1]) + 1e-9
+        assert not corner.stops or at_mps == pytest.approx(0.0, abs=1e-6)
+
+
+@given(st.floats(5, 80), st.floats(0.5, 6), st.floats(0.3, 3), st.floats(0.3, 3))
+def test_a_straight_leg_takes_what_its_speeds_say(
+    length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float
+) -> None:
+    vehicle = Vehicle(
+        waypoint_radius_m=1.0, speed_mps=speed_mps, accel_max_mps2=accel_mps2, jerk_mps3=jerk_mps3
+    )
+    band = envelope(polyline([length_m], []), vehicle, heading_deg=0.0)
+    places_m = np.linspace(0.01 * length_m, 0.99 * length_m, 20_000)
+    took_s = float((np.diff(places_m) / band.speeds_mps(places_m)[1:]).sum())
+    profile = leg_profile(length_m, speed_mps, accel_mps2, jerk_mps3)
+    inner_s = [
+        s
+        for s in np.linspace(0, profile.duration_s, 20_001)
+        if places_m[0] <= profile.travelled_m(s) <= places_m[-1]
+    ]
+    assert took_s == pytest.approx(inner_s[-1] - inner_s[0], rel=0.02)
+
+
+def test_px4_slows_down_to_the_speed_that_it_takes_a_corner_at() -> None:
+    steers = Pursuit(
+        acceptance_m=0.5, acceptance_max_m=3.0, acceptance_gain=2.0, wheel_base_m=0.321,
+        steering_angle_rad=0.5236, speed_reduction=0.5, full_speed_mps=3.0,
+    )  # fmt: skip
+    vehicle = Vehicle(
+        waypoint_radius_m=0.5, speed_mps=3.0, turn_radius_m=0.556, autopilot=Autopilot.PX4, pursuit=steers
+    )
+    band = envelope(polyline([30, 30], [90]), vehicle, heading_deg=0.0)
+    along_m = np.array([15.0, 29.0, 30.0, 31.0, 45.0])
+    speeds_mps = band.speeds_mps(along_m)
+    assert speeds_mps[[0, 4]] == pytest.approx(3.0)
+    assert speeds_mps[2] == pytest.approx(3.0 * (1 - 0.5 * 90 / 180))
+    assert speeds_mps[2] < speeds_mps[1] <= 3.0
+    assert speeds_mps[1] == pytest.approx(speeds_mps[3])
 
 
 # --- the motion along a leg --------------------------------------------------------------------------------------------------

@@ -89,9 +89,15 @@ def test_samples_along_a_route_are_its_room(planned, flat, fence):
         assert sample.drawn_m == pytest.approx(place.distance(fence.boundary), abs=0.15)
         near = corridor.intersection(place.buffer(0.05)).distance(fence.boundary)
         assert sample.driven_m <= near + 0.1
-        assert 0.0 < sample.top_speed_mps <= planned.vehicle.speed_mps + 1e-9
+        assert 0.0 <= sample.speed_mps <= planned.vehicle.speed_mps + 1e-9
     assert min(sample.driven_m for sample in samples) >= planned.driven_clearance_m - 0.01
     assert planned.driven_clearance_m >= 2.5
+    # From rest to rest, and slower in a corner than on the way to it.
+    speeds_mps = [sample.speed_mps for sample in samples]
+    assert (speeds_mps[0], speeds_mps[-1]) == pytest.approx((0.0, 0.0), abs=0.01)
+    corner_m = shapely.LineString(flat(planned.path[:2])).length
+    (at_corner,) = {min(samples, key=lambda one: abs(one.along_m - corner_m)).speed_mps}
+    assert at_corner < max(speeds_mps) - 0.05
 
 
 def test_a_drive_is_measured_against_line_corridor_and_fence(planned, flat, fence):

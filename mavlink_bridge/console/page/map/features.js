@@ -1,6 +1,6 @@
 /** What is known, as features for the map's sources: pure functions. */
 
-import { circle, outline } from "../geo.js";
+import { circle, metres, outline } from "../geo.js";
 import { texts } from "../texts.js";
 
 /** @typedef {import("../geo.js").Place} Place */
@@ -43,9 +43,37 @@ export function meant(fence) {
   ];
 }
 
-/** @param {import("../types.js").Fence} fence */
-export function zones(fence) {
-  return fence.held.features.map((zone) => feature(zone.geometry, { ...zone.properties, name: texts.fence.zoneLabel(zone.properties) }));
+/**
+ * @param {import("../types.js").Fence} fence
+ * @param {{pixel_m: number, scale: number}} look how many metres a pixel is, and how large letters are against the usual
+ */
+export function zones(fence, look) {
+  return fence.held.features.map(({ geometry, properties }) => {
+    const name = texts.fence.zoneLabel(properties);
+    return feature(geometry, { ...properties, name: properties.kind === "inclusion" || hasRoom(geometry.coordinates[0], name, look) ? name : "" });
+  });
+}
+
+// Of a name on the map: 12 px letters are so wide, lines so high and so long at the most, and it may cover so much of its shape. Chosen by looking at it.
+const NAME = { letter_px: 6.6, line_px: 14.4, letters: 14, share: 0.75 };
+
+/**
+ * Whether a name leaves enough of its shape to be seen: on a small screen all of it would lie under the letters.
+ * @param {Place[]} ring
+ * @param {string} name
+ * @param {{pixel_m: number, scale: number}} look
+ */
+function hasRoom(ring, name, { pixel_m, scale }) {
+  const rows = name.split(" ").reduce((/** @type {string[]} */ found, word) => {
+    const last = found.at(-1);
+    return last !== undefined && last.length + word.length < NAME.letters ? [...found.slice(0, -1), `${last} ${word}`] : [...found, word];
+  }, []);
+  const wide_m = Math.max(...rows.map((row) => row.length)) * NAME.letter_px * scale * pixel_m;
+  const high_m = rows.length * NAME.line_px * scale * pixel_m;
+  const corners = ring.map((place) => metres(place, ring[0]));
+  const [east_m, north_m] = [0, 1].map((i) => Math.max(...corners.map((corner) => corner[i])) - Math.min(...corners.map((corner) => corner[i])));
+  const twice_m2 = corners.reduce((sum, [x, y], i) => sum + x * corners[(i + 1) % corners.length][1] - corners[(i + 1) % corners.length][0] * y, 0);
+  return wide_m <= east_m && high_m <= north_m && wide_m * high_m <= (NAME.share * Math.abs(twice_m2)) / 2;
 }
 
 /** @param {import("../types.js").Fence} fence */

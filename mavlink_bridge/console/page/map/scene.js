@@ -1,6 +1,7 @@
 /** Keeps the map as the page's state is: each source is filled anew when what it shows has changed. */
 
 import { box, places } from "../geo.js";
+import { letterScale } from "../dom.js";
 import { lookOf } from "../modes.js";
 import { nearest } from "../profile.js";
 import * as features from "./features.js";
@@ -34,6 +35,7 @@ export class Scene {
     for (const kind of /** @type {const} */ (["dragstart", "zoomstart", "rotatestart"])) {
       view.map.on(kind, (event) => { this.isMoved ||= "originalEvent" in event && Boolean(event.originalEvent); });
     }
+    view.map.on("zoomend", () => view.isReady && this.showZones());
     view.map.on("resize", () => this.isFitted && !this.isMoved && !this.isFollowing && this.fit(true));
   }
 
@@ -42,7 +44,7 @@ export class Scene {
     store.watch(["fence", "looked", "doc"], ({ fence, looked, doc }) => {
       const shown = doc.zones !== null && looked ? looked : fence;
       view.set("meant", features.meant(shown));
-      view.set("zones", doc.zones === null || looked?.held.features.length ? features.zones(shown) : []);
+      this.showZones();
       view.set("obstacles", features.obstacles(fence));
     });
     store.watch(["plan"], ({ plan }) => {
@@ -64,6 +66,14 @@ export class Scene {
     store.watch(["hoverLeg"], ({ hoverLeg }) => { view.hoverLeg(hoverLeg, this.hovered); this.hovered = hoverLeg; });
     store.watch(["hoverAlong_m"], (state) => this.showAlong(state));
     store.watch(["home", "fence", "vehicle"], (state) => this.fitOnce(state));
+  }
+
+  /** The zones, with the names that have room as far as the map is zoomed in. */
+  showZones() {
+    const { fence, looked, doc } = this.store.state;
+    const shown = doc.zones !== null && looked ? looked : fence;
+    const look = { pixel_m: this.view.pixel_m(), scale: letterScale() };
+    this.setIfOther("zones", doc.zones === null || looked?.held.features.length ? features.zones(shown, look) : []);
   }
 
   /** @param {PageState} state */

@@ -1,5 +1,7 @@
 /** How the map looks: one table of colours for light and one for dark, and the layers from the ground up. */
 
+import { letterScale } from "../dom.js";
+
 /** @typedef {import("../vendor/maplibre-gl/maplibre-gl.mjs").LayerSpecification} Layer */
 /** @typedef {import("../vendor/maplibre-gl/maplibre-gl.mjs").StyleSpecification} Style */
 
@@ -64,7 +66,7 @@ export function style(isDark, tiles) {
  * @returns {Layer}
  */
 function scaled(layer) {
-  const scale = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16;
+  const scale = letterScale();
   if (layer.type !== "symbol" || !layer.layout) {
     return layer;
   }

@@ -68,7 +68,12 @@ def draw(page: Path) -> None:
                     stderr=subprocess.DEVNULL,
                 )
         for picture in pictures_made_by(page):
-            few_colours = Image.open(folder / picture).convert("RGB").quantize(128, dither=Image.Dither.NONE)
+            # By coverage: the median cut turned the yellow of targets brown where there was much else.
+            few_colours = (
+                Image.open(folder / picture)
+                .convert("RGB")
+                .quantize(128, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            )
             few_colours.save(HERE / picture, optimize=True)  # a third of the bytes
 
 

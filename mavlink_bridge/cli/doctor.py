@@ -50,7 +50,7 @@ _NEEDED = (
     "rich",
     "platformdirs",
 )
-_WANTED = {"matplotlib": "pictures (.png, .svg, .pdf)"}
+_WANTED = {"matplotlib": "pictures (.png, .pdf) and charts"}
 _START, _TARGET = (40.071374, -105.229930), (40.0726316, -105.2290497)
 _CLEARANCE_M = 2.5  # of the test plan, for which `SHORTEST_M` holds
 SHORTEST_M = 163.1

@@ -17,7 +17,6 @@ import typer
 
 from mavlink_bridge import errors as bridge_errors
 from mavlink_bridge.cli.terminal import print_json, say
-from mavlink_bridge.protocol.verified_outcome import OutcomeKind
 from missions import errors as mission_errors
 
 _IS_WINDOWS = os.name == "nt"
@@ -124,6 +123,9 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
     bridge_errors.BridgeError: (),
 }
 """What helps with each kind of error where the error does not say it itself; several are alternatives. A test looks that every kind is here."""
+
+_ACTIVE_OUTCOME = "active"
+"""`OutcomeKind.ACTIVE` as details have it: text, so that help need not load the protocols' own words."""
 
 _ACTIVE_ADVICE = (
     "add --hold to switch it to HOLD first",
@@ -308,7 +310,7 @@ def advice_for(command: str, error: Exception) -> str | None:
     details = getattr(error, "details", {})
     if (silent := _silent_advice(details)) is not None:
         return silent
-    if details.get("outcome") == OutcomeKind.ACTIVE:
+    if details.get("outcome") == _ACTIVE_OUTCOME:
         return _alternatives(_ACTIVE_ADVICE, str(error))
     if "advice" in details:
         return str(details["advice"]) if details["advice"] else None

@@ -23,7 +23,6 @@ from mavlink_bridge.dataset.questions import QUESTIONS, AnswerRows, as_json, ask
 from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import UsageError
 from mavlink_bridge.many import open_workers
-from missions.picture import check_picture_format
 from missions.picture.charts import check_chart_formats
 from missions.words import counted
 
@@ -125,8 +124,6 @@ def _ask(options: LogsOptions) -> None:
     if options.promise is not None and names != ["promise"]:
         raise UsageError("--promise belongs to the question `promise`")
     check_chart_formats(options.plot)
-    for path in options.plot:
-        check_picture_format(path)
     dataset = Dataset(Path(folder))
     question = QUESTIONS[names[0]] if names else None
     if question is not None:

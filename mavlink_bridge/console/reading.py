@@ -250,13 +250,7 @@ def written(situation: Situation, suffix: str, part: Part | None = None) -> tupl
 
 
 def picture(plan: Plan) -> bytes:
-    """Return a picture of a plan, as ``--plot`` draws it.
-
-    Raises
-    ------
-    MissionFormatError
-        The library that draws is not installed.
-    """
+    """Return a picture of a plan, as ``--plot`` draws it."""
     found: list[bytes] = []
     draw_plan(plan, Path("plan.svg"), write=lambda _path, data: found.append(data))
     return found[0]

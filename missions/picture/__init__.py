@@ -1,4 +1,4 @@
-"""Pictures of plans, checks and drives: images (matplotlib, the extra ``plot``) and a sketch for the terminal; the suffix chooses.
+"""Pictures of plans, checks and drives: images and a sketch for the terminal; the suffix chooses. PNG and PDF need the extra ``plot``.
 
 Pages (``.html``) are the console's, and made by what knows it: `mavlink_bridge.console.stills.plan_page`, and the commands' ``--plot``.
 """
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 from missions.errors import MissionFormatError
 from missions.formats.files import write_file
+from missions.picture.page import scene_drawing
 from missions.picture.plans import plan_scene
 from missions.picture.sketch import Sketch, sketch
+from missions.picture.svg import svg_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,11 +72,11 @@ def check_picture_format(path: Path | str, *, beside: Sequence[str] = ()) -> Non
             if is_page
             else "choose another file extension",
         )
-    if find_spec("matplotlib") is None:
+    if path.suffix.lower() != ".svg" and find_spec("matplotlib") is None:
         raise MissionFormatError(
             f"{path.suffix} pictures need matplotlib: pip install 'pbpp-rover[plot]'",
             file=str(path),
-            advice="install it, or use - for a sketch in the terminal",
+            advice="install it, or use .svg, or - for a sketch in the terminal",
         )
 
 
@@ -126,9 +128,13 @@ def draw_scene(scene: PictureScene, path: Path | str, *, write: Writer = write_f
     """
     path = Path(path)
     check_picture_format(path)
-    from missions.picture.figure import scene_image  # noqa: PLC0415 - slow to come, an extra
+    drawing = scene_drawing(scene)
+    if path.suffix.lower() == ".svg":
+        write(path, svg_bytes(drawing))
+        return
+    from missions.picture.figure import image_bytes  # noqa: PLC0415 - slow to come, an extra
 
-    write(path, scene_image(scene, path.suffix))
+    write(path, image_bytes(drawing, path.suffix))
 
 
 def sketch_plan(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from missions.errors import MissionFormatError
@@ -53,7 +54,7 @@ def check_chart_formats(paths: Sequence[Path]) -> None:
     Raises
     ------
     MissionFormatError
-        A suffix is unknown.
+        A suffix is unknown, or the library that draws charts is not installed.
     """
     for path in paths:
         if path.suffix.lower() not in CHART_SUFFIXES:
@@ -61,4 +62,8 @@ def check_chart_formats(paths: Sequence[Path]) -> None:
                 f"{path}: {path.suffix!r} is not a supported format of charts; supported: {', '.join(CHART_SUFFIXES)}",
                 file=str(path),
                 advice="choose another file extension",
+            )
+        if find_spec("matplotlib") is None:
+            raise MissionFormatError(
+                "charts need matplotlib: pip install 'pbpp-rover[plot]'", file=str(path), advice="install it"
             )

@@ -22,6 +22,9 @@ TRACKS: Final = ("#000000", "#7A4A00", "#5B3FB5", "#2E7F8E", "#AA3377", "#8A6A00
 TRACK_DASHES: Final = ("-", "--", "-.", ":")
 """Their dashes, one after the other where the colours have been used."""
 
+DASHES: Final = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
+"""Line and gap by turns, in widths of the line: those of matplotlib, which draws charts with the same."""
+
 MOST_LOOKS: Final = len(TRACKS) * len(TRACK_DASHES)
 """So many driven lines can be told apart."""
 

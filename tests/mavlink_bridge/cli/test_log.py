@@ -18,7 +18,7 @@ from missions.fence import Fence
 from missions.geo import LatLon
 from missions.picture import draw_scene
 from missions.picture.drives import drive_scene
-from missions.picture.figure import scene_figure
+from missions.picture.page import scene_drawing
 
 
 def run(*arguments: str):
@@ -126,7 +126,7 @@ def test_a_picture_tells_drives_apart_and_names_start_and_breaches(two_drives, t
         "left the fence",
         "start",
     ):
-        assert f"<!-- {words} -->" in text
+        assert f">{words}</text>" in text
     sketch = run(str(two_drives), "--plot", "-").stdout
     assert sketch.count("✗") == 3  # two breaches, and the legend
     assert "S start" in sketch
@@ -278,13 +278,24 @@ def test_the_picture_shows_each_mode_once_and_the_track_in_place(tmp_path):
     places = [LatLon(40.0, -105.0), LatLon(40.0001, -105.0), LatLon(40.0002, -105.0)]
     parts = [("AUTO", places[:2]), ("HOLD", places[1:]), ("AUTO", places[1:])]
     scene = drive_scene(("A drive",), Fence(FIELD.zones), parts, targets=(places[2],))
-    axes = scene_figure(scene).axes[0]
-    labels = [line.get_label() for line in axes.get_lines() if not line.get_label().startswith("_")]
-    assert labels == ["AUTO", "HOLD", "start", "target"]
-    auto = next(line for line in axes.get_lines() if line.get_label() == "AUTO")
-    north_m = auto.get_ydata()
-    assert north_m[1] - north_m[0] == pytest.approx(11.1, abs=0.05)
-    assert scene.start == pytest.approx(auto.get_xydata()[0])
+    drawing = scene_drawing(scene)
+    assert [part.text for part in drawing.around if part.name == "legend"][-4:] == [
+        "AUTO",
+        "HOLD",
+        "start",
+        "target",
+    ]
+    auto, hold, again = (part for part in drawing.inside if part.name == "track")
+    assert auto.look == again.look != hold.look
+    left, top, _right, bottom = drawing.frame
+    m_per_pt = (scene.bounds_m[3] - scene.bounds_m[1]) / (bottom - top)
+    (begin, end) = auto.lines[0]
+    assert (begin - end)[1] * m_per_pt == pytest.approx(11.1, abs=0.05)
+    start = (
+        (begin[0] - left) * m_per_pt + scene.bounds_m[0],
+        (bottom - begin[1]) * m_per_pt + scene.bounds_m[1],
+    )
+    assert scene.start == pytest.approx(start, abs=0.01)
     west, south, east, north = scene.bounds_m
     assert (east - west, north - south) == pytest.approx((112.0, 112.0), abs=1.0)
     with pytest.raises(MissionFormatError, match="nothing to draw"):

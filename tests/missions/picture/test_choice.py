@@ -43,11 +43,12 @@ def test_unknown_suffixes() -> None:
         check_picture_format(Path("x.bmp"))
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg"])
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
 def test_a_library_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, suffix: str) -> None:
     monkeypatch.setattr(picture, "find_spec", lambda _name: None)
     with pytest.raises(MissionFormatError, match=rf"{suffix} pictures need matplotlib: pip install"):
         check_picture_format(Path(f"x{suffix}"))
+    check_picture_format(Path("x.svg"))
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg"])

@@ -1,18 +1,22 @@
 """Whether a calibration holds what it says: a simulated rover whose steering law is worse than its parameters say, calibrated by its drives, then driven anew.
 
-``python benchmarks/calibration.py [--sample 2400] [--kept-back 2000] [--corners 20000] [--drives 200] [--circle 2.6] [--jobs 2] [--lines FILE] [-o FILE]``. Drives of ten corners
-each (20 to 135 degrees, legs of 12 to 40 m, 2 m/s) are simulated in stepped time; the vehicle's own positions, five a second, go through the grading of `pbpp log` and the
-classes of `pbpp logs calibrate`. Then counted: of corners kept back those within the calibrated bounds (by the vehicle's own positions and by the true ones), the bound against the
-99 % quantile of all corners, and drives whose true track left the calibrated corridor by more than 0.10 m. ``--lines`` keeps each drive; started again it goes on.
+``python benchmarks/calibration.py [--samples 2400 8000 18000] [--kept-back 2000] [--corners 20000] [--drives 200] [--circle 2.6] [--jobs 2] [--lines FILE] [-o FILE]``. Drives of
+ten corners each (20 to 135 degrees, legs of 12 to 40 m, 2 m/s) are simulated in stepped time; the vehicle's own positions, five a second, go through the grading of `pbpp log` and
+the classes of `pbpp logs calibrate`, with so many corners to calibrate by. Then counted: of corners kept back those within the calibrated bounds (by the vehicle's own positions and
+by the true ones), the bound against the 99 % quantile of all corners, and drives whose true track left the calibrated corridor by more than 0.10 m. ``--lines`` keeps each drive;
+started again it goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
+import platform
 import random
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
 from functools import partial
@@ -21,7 +25,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from mavlink_bridge.dataset.calibrate import corner_classes, leg_classes
+from mavlink_bridge.dataset.calibrate import NEARLY, corner_classes, leg_classes
 from mavlink_bridge.logbook.grade import DriveGrader, GradedField, way_of
 from mavlink_bridge.logbook.track import TrackFix
 from mavlink_bridge.mavlink.rover import Mode
@@ -64,12 +68,11 @@ def line(seed: int) -> list[tuple[float, float]]:
     return places
 
 
-def drive(seed: int, circle_m: float) -> dict[str, object]:
-    """Drive a line in AUTO with a turning circle that the parameters do not tell; return its legs as graded by own and by true positions, and the true track."""
-    body._TURNING_CIRCLE_M = circle_m  # noqa: SLF001 - the law that is changed
+def mission(seed: int) -> list[MissionItem]:
+    """Return the waypoints of a drive."""
     frame = LocalFrame(HOME)
     places = [frame.to_lat_lon(LocalPoint(*place)) for place in line(seed)]
-    items = [
+    return [
         MissionItem(
             Command.NAV_WAYPOINT,
             CoordinateFrame.GLOBAL,
@@ -79,11 +82,25 @@ def drive(seed: int, circle_m: float) -> dict[str, object]:
         )
         for p in places[1:]
     ]
+
+
+Track = list[tuple[tuple[float, int, float, float], LatLon]]
+"""Of each position the time, the mission item, heading and speed; and the place."""
+
+
+def drive(seed: int, circle_m: float) -> dict[str, object]:
+    """Drive a line in AUTO with a turning circle that the parameters do not tell; return its legs as graded by own and by true positions, and the true track."""
+    return told(seed, *tracks(seed, circle_m))
+
+
+def tracks(seed: int, circle_m: float) -> tuple[Track, Track]:
+    """Return the own and the true positions of a drive."""
+    body._TURNING_CIRCLE_M = circle_m  # noqa: SLF001 - the law that is changed
     vehicle = SimulatedVehicle(
         SimulatorConfig(
             home=HOME,
             heading_deg=0.0,
-            mission=tuple(items),
+            mission=tuple(mission(seed)),
             parameters=PARAMETERS,
             firmware=Firmware(4, 6),
             streams=False,
@@ -106,8 +123,14 @@ def drive(seed: int, circle_m: float) -> dict[str, object]:
             true.append((now, rover.position))
         tick += 1
         rover.step(1.0 + tick * TICK_S)
+    return own, true
+
+
+def told(seed: int, own: Track, true: Track) -> dict[str, object]:
+    """Return what is kept of a drive."""
+    frame = LocalFrame(HOME)
     known = vehicle_from_parameters(PARAMETERS, firmware=Firmware(4, 6))
-    way = way_of(items, 1, home_first=True)
+    way = way_of(mission(seed), 1, home_first=True)
     legs = {
         name: graded(track, way, GradedField(frame, None, known), frame)
         for name, track in (("own", own), ("true", true))
@@ -133,7 +156,13 @@ def graded(track: list, way: object, field: GradedField, frame: LocalFrame) -> l
 
 def columns(drives: list[dict], which: str) -> dict[str, np.ndarray]:
     """Return the corners of drives as `corner_classes` takes them."""
-    legs = [leg for one in drives for leg in one[which] if leg["turn_deg"] is not None and leg["is_whole"]]
+    pairs = [
+        (leg, after)
+        for one in drives
+        for leg, after in itertools.pairwise(one[which])
+        if leg["turn_deg"] is not None and leg["is_whole"]
+    ]
+    legs = [leg for leg, _ in pairs]
 
     def more(side: str) -> np.ndarray:
         bound = {"inside": "inside_cut_m", "outside": "outside_overshoot_m"}[side]
@@ -148,11 +177,18 @@ def columns(drives: list[dict], which: str) -> dict[str, np.ndarray]:
         "beyond_m": np.array([max(leg["inside_beyond_m"], leg["outside_beyond_m"]) for leg in legs]),
         "gap_m": np.array([leg["gap_m"] for leg in legs]),
         "is_bounded": np.array([leg["is_bounded"] for leg in legs]),
+        "is_at_speed": np.array([all(map(at_speed, pair)) for pair in pairs]),
         "cut": np.array([leg["inside_cut_m"] for leg in legs]),
         "overshoot": np.array([leg["outside_overshoot_m"] for leg in legs]),
         "cut_bound": np.array([leg["foreseen_inside_cut_m"] for leg in legs]),
         "overshoot_bound": np.array([leg["foreseen_outside_overshoot_m"] for leg in legs]),
     }
+
+
+def at_speed(leg: dict) -> bool:
+    """Return whether a leg was driven at the speed in force, as `pbpp logs calibrate` asks."""
+    driven_mps = leg["driven_mps"]
+    return driven_mps is not None and abs(driven_mps / leg["foreseen_driven_mps"] - 1) <= NEARLY
 
 
 def calibration_of(drives: list[dict]) -> Calibration:
@@ -185,7 +221,9 @@ def simulated(count: int, first: int, options: argparse.Namespace, kept: dict[in
 def main() -> None:
     """Run it and print what was found."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sample", type=int, default=2400, help="corners to calibrate by")
+    parser.add_argument(
+        "--samples", type=int, nargs="+", default=[2400, 8000, 18_000], help="corners to calibrate by"
+    )
     parser.add_argument("--kept-back", type=int, default=2000)
     parser.add_argument(
         "--corners", type=int, default=20_000, help="corners whose quantile counts, those above included"
@@ -205,36 +243,35 @@ def main() -> None:
             one["seed"]: one
             for one in map(json.loads, options.lines.read_text(encoding="utf-8").splitlines())
         }
-    counts = [math.ceil(number / CORNERS) for number in (options.sample, options.kept_back)]
-    sample = simulated(counts[0], 0, options, kept)
-    back = simulated(counts[1], counts[0], options, kept)
+    back_drives, *samples = (math.ceil(number / CORNERS) for number in (options.kept_back, *options.samples))
+    every = simulated(max(math.ceil(options.corners / CORNERS), back_drives + max(samples)), 0, options, kept)
+    back = every[:back_drives]
     fresh = simulated(options.drives, 1_000_000, options, kept)
-    rest = simulated(max(0, math.ceil(options.corners / CORNERS) - sum(counts)), sum(counts), options, kept)
-    text = (
-        report(options, sample, back, fresh, rest)
-        + f"\n- {time.process_time() - begun_s:.0f} CPU s in this process\n"
-    )
+    parts = [head(options, len(back), len(columns(every, "own")["turn_deg"]))]
+    for count in samples:
+        calibration = calibration_of(every[back_drives : back_drives + count])
+        parts.append(f"{count} drives to calibrate by:")
+        parts.append("\n".join(classes(calibration, every)))
+        parts.append("\n".join([*kept_back(calibration, back), *driven_anew(calibration, fresh)]))
+    parts.append(f"{time.process_time() - begun_s:.0f} CPU s in this process")
+    text = "\n\n".join(parts) + "\n"
     print(text)
     if options.output:
         options.output.write_text(text, encoding="utf-8")
 
 
-def report(
-    options: argparse.Namespace, sample: list[dict], back: list[dict], fresh: list[dict], rest: list[dict]
-) -> str:
-    """Return what was found."""
-    calibration = calibration_of(sample)
-    vehicle = replace(vehicle_from_parameters(PARAMETERS, firmware=Firmware(4, 6)), calibration=calibration)
-    plain = replace(vehicle, calibration=None)
-    lines = [
-        f"turning circle {options.circle} m where the parameters tell 1.8 m; {len(sample)} drives to calibrate by, {CORNERS} corners each",
-        "",
-    ]
-    lines += [
-        "| turn | corners | adds inside | adds outside | corridor grows | cut: bound / 99 % | overshoot: bound / 99 % |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    everything = columns([*sample, *back, *rest], "own")
+def head(options: argparse.Namespace, back: int, corners: int) -> str:
+    """Return what was driven, with what."""
+    versions = f"Python {platform.python_version()}, numpy {np.__version__}"
+    drives = f"{back} drives kept back, {CORNERS} corners each; 99 % quantiles of {corners} corners"
+    return f"{versions}; turning circle {options.circle} m where the parameters tell 1.8 m; {drives}"
+
+
+def classes(calibration: Calibration, every: list[dict]) -> Iterator[str]:
+    """Yield the table of a calibration's classes: each bound beside what 99 % of all corners kept; of the bounds told for its corners, which depend on the legs, their 99 % quantile."""
+    yield "| turn | corners | adds inside | adds outside | corridor grows | cut: bound / 99 % | overshoot: bound / 99 % |"
+    yield "|---|---|---|---|---|---|---|"
+    everything = columns(every, "own")
     turns = np.array([turn_class(turn) for turn in everything["turn_deg"]])
     for one in calibration.corners:
         these = turns == turn_class(one.turn_from_deg)
@@ -249,14 +286,16 @@ def report(
             q99 = float(np.quantile(everything[name][these], 0.99))
             bound = float(np.quantile(everything[f"{name}_bound"][these], 0.99)) + more_m
             cells.append(f"{bound:.2f} / {q99:.2f} = {bound / q99:.2f}")
-        lines.append(f"| {' | '.join(cells)} |")
-    lines.append("")
+        yield f"| {' | '.join(cells)} |"
+
+
+def kept_back(calibration: Calibration, back: list[dict]) -> Iterator[str]:
+    """Yield how many of the corners kept back were within the bounds and the corridor."""
+    more = {
+        (turn_class(one.turn_from_deg), speed_class(one.speed_from_mps)): one for one in calibration.corners
+    }
     for which in ("own", "true"):
         found = columns(back, which)
-        more = {
-            (turn_class(one.turn_from_deg), speed_class(one.speed_from_mps)): one
-            for one in calibration.corners
-        }
         mine = [
             more.get((turn_class(t), speed_class(s)))
             for t, s in zip(found["turn_deg"], found["speed_mps"], strict=True)
@@ -269,20 +308,22 @@ def report(
             one is not None and far <= one.beyond_m for one, far in zip(mine, found["beyond_m"], strict=True)
         )
         without = int(((found["inside_m"] <= 0) & (found["outside_m"] <= 0)).sum())
-        lines.append(
+        yield (
             f"- of {len(mine)} corners kept back, by the {which} positions: {inside} ({inside / len(mine):.2%}) within both bounds, {held} ({held / len(mine):.2%}) within the corridor; "
             f"without calibration {without} ({without / len(mine):.2%}) and {int((found['beyond_m'] <= 0).sum())}"
         )
-    for name, known in (("with", vehicle), ("without", plain)):
+
+
+def driven_anew(calibration: Calibration, fresh: list[dict]) -> Iterator[str]:
+    """Yield how many new drives left the corridor, with the calibration and without."""
+    plain = vehicle_from_parameters(PARAMETERS, firmware=Firmware(4, 6))
+    for name, known in (("with", replace(plain, calibration=calibration)), ("without", plain)):
         beyond = []
         for one in fresh:
             area = envelope(line(one["seed"]), known, heading_deg=0.0).area
             shapely.prepare(area)
             beyond.append(float(shapely.distance(area, shapely.points(np.array(one["track"]))).max()))
-        lines.append(
-            f"- of {len(fresh)} fresh drives {sum(far > ALLOWED_M for far in beyond)} left the corridor {name} calibration by more than {ALLOWED_M} m (the farthest by {max(beyond):.2f} m), by their true track"
-        )
-    return "\n".join(lines)
+        yield f"- of {len(fresh)} fresh drives {sum(far > ALLOWED_M for far in beyond)} left the corridor {name} calibration by more than {ALLOWED_M} m (the farthest by {max(beyond):.2f} m), by their true track"
 
 
 if __name__ == "__main__":

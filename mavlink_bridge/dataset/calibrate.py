@@ -39,6 +39,10 @@ MOST_GAP_M: Final = 1.0
 """Corners whose positions lie farther apart than this do not narrow a bound: between them the cut may have been deeper. Chosen: at this spacing an arc of 2 m radius is
 missed by 0.06 m at the most."""
 
+NEARLY = 0.1
+"""Corners between legs that were driven at another speed than predicted, by more than this share, do not narrow a bound: something that the log does not tell slowed the
+rover. Chosen: half a class at 2.5 m/s."""
+
 _ROUNDED = 3  # decimals of metres in the file; away from the safe side by nothing: it is rounded up
 
 
@@ -62,8 +66,10 @@ class Calibrated:
 _CORNERS = """SELECT log, drive, abs(turn_deg) AS turn_deg, greatest(speed_mps, coalesce(next_mps, 0)) AS speed_mps, stands,
     inside_cut_m - predicted_inside_cut_m AS inside_m, outside_overshoot_m - predicted_outside_overshoot_m AS outside_m,
     greatest(coalesce(inside_beyond_m, 0), coalesce(outside_beyond_m, 0)) AS beyond_m,
-    gap_m, coalesce(is_bounded, false) AS is_bounded
-FROM (SELECT *, lead(speed_mps) OVER (PARTITION BY log, vehicle, drive ORDER BY leg) AS next_mps FROM legs WHERE vehicle = ?)
+    gap_m, coalesce(is_bounded, false) AS is_bounded, coalesce(off_speed <= $nearly AND next_off_speed <= $nearly, false) AS is_at_speed
+FROM (SELECT *, lead(speed_mps) OVER one_drive AS next_mps, lead(off_speed) OVER one_drive AS next_off_speed
+    FROM (SELECT *, abs(driven_mps / predicted_driven_mps - 1) AS off_speed FROM legs WHERE vehicle = $system)
+    WINDOW one_drive AS (PARTITION BY log, vehicle, drive ORDER BY leg))
 WHERE turn_deg IS NOT NULL AND is_whole AND predicted_inside_cut_m IS NOT NULL ORDER BY log, drive, leg"""
 _LEGS = """SELECT speed_mps, straight_m - predicted_straight_m AS more_m FROM legs
 WHERE vehicle = ? AND is_whole AND straight_m IS NOT NULL AND predicted_straight_m IS NOT NULL"""
@@ -115,7 +121,7 @@ def calibrate(dataset: Dataset, system: int | None) -> Calibrated:
         same = {"system": system, "firmware": version, "newest": newest, "bending": bending}
         known = {log for (log,) in database.execute(_SAME, same).fetchall()} if bending else set()
         twice = {log for (log,) in database.execute(_TWICE, [system]).fetchall()}
-        corners = database.execute(_CORNERS, [system]).fetchnumpy()
+        corners = database.execute(_CORNERS, {"system": system, "nearly": NEARLY}).fetchnumpy()
         legs = database.execute(_LEGS, [system]).fetchnumpy()
     finally:
         database.close()
@@ -133,7 +139,8 @@ def calibrate(dataset: Dataset, system: int | None) -> Calibrated:
         parameters=parameters,
         firmware=None if firmware is None else str(firmware),
     )
-    return Calibrated(system, calibration, tuple(_remarks(calibration, is_tuned_so, is_once)))
+    is_at_speed = corners["is_at_speed"].astype(bool)
+    return Calibrated(system, calibration, tuple(_remarks(calibration, is_tuned_so, is_once, is_at_speed)))
 
 
 def _chosen(database: Any, system: int | None) -> int:  # noqa: ANN401 - a duckdb connection
@@ -168,7 +175,7 @@ def corner_classes(
     ----------
     columns : dict of str to ndarray, shape (n,)
         Of each corner: ``turn_deg``, ``speed_mps``, ``stands``, ``inside_m`` and ``outside_m`` (measured less its bound), ``beyond_m`` (outside the
-        corridor), ``gap_m``, ``is_bounded``.
+        corridor), ``gap_m``, ``is_bounded``, ``is_at_speed`` (whether the legs at it were driven at the speed in force).
     vehicle : Vehicle
     is_tuned_so : ndarray of bool, shape (n,)
         Whether it was driven with the parameters that the rover has now; others widen, and do not narrow.
@@ -176,7 +183,8 @@ def corner_classes(
     turns = np.array([turn_class(turn_deg) for turn_deg in columns["turn_deg"].tolist()], dtype=np.int64)
     speeds = np.array([speed_class(speed_mps) for speed_mps in columns["speed_mps"].tolist()], dtype=np.int64)
     stands = columns["stands"].astype(bool)
-    tells = is_tuned_so & (columns["gap_m"] <= MOST_GAP_M) & columns["is_bounded"].astype(bool)
+    tells = is_tuned_so & (columns["gap_m"] <= MOST_GAP_M)
+    tells &= columns["is_bounded"].astype(bool) & columns["is_at_speed"].astype(bool)
     found = []
     for turn, speed, stood in sorted(set(zip(turns.tolist(), speeds.tolist(), stands.tolist(), strict=True))):
         these = (turns == turn) & (speeds == speed) & (stands == stood)
@@ -258,7 +266,10 @@ def _rounded_up(value_m: float) -> float:
 
 
 def _remarks(
-    calibration: Calibration, is_tuned_so: NDArray[np.bool_], is_once: NDArray[np.bool_]
+    calibration: Calibration,
+    is_tuned_so: NDArray[np.bool_],
+    is_once: NDArray[np.bool_],
+    is_at_speed: NDArray[np.bool_],
 ) -> list[str]:
     few = sum(one.corners < LEAST_CORNERS for one in calibration.corners)
     remarks = []
@@ -273,6 +284,10 @@ def _remarks(
     if twice := int((~is_once).sum()):
         remarks.append(
             f"{counted(twice, 'corner')} in logs without times of day, or at a time when another log of the same system id has drives (another recording, or another rover): that may widen the corridor, and narrows nothing"
+        )
+    if slowed := int((~is_at_speed).sum()):
+        remarks.append(
+            f"{counted(slowed, 'corner')} between legs that were driven slower or faster than predicted, by more than {NEARLY:.0%}, or it is not known how fast: that may widen the corridor, and narrows nothing"
         )
     return remarks
 

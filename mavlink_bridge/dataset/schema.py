@@ -8,7 +8,7 @@ from typing import Final
 
 _PATTERN = re.compile(r"[\[*?]")
 
-SCHEMA_VERSION: Final = 1
+SCHEMA_VERSION: Final = 2
 """Goes up when a column is renamed, removed or means something else; a dataset of another version is refused, not guessed at."""
 
 
@@ -266,7 +266,10 @@ _LEGS = Table(
         _DRIVE,
         Column("leg", "INTEGER", "its number in the drive, from 1"),
         Column("item", "INTEGER", "the mission item (seq) that it leads to"),
-        *_numbers("DOUBLE", "length_m", "from waypoint to waypoint", "speed_mps", "asked for"),
+        *_numbers("DOUBLE", "length_m", "from waypoint to waypoint"),
+        *_numbers("DOUBLE", "speed_mps", "in force: the mission's, or that of a station's DO_CHANGE_SPEED"),
+        *_numbers("DOUBLE", "driven_mps", "the fastest it was in its middle third"),
+        *_numbers("DOUBLE", "predicted_driven_mps", "as predicted: on a short leg less than `speed_mps`"),
         *_numbers(
             "DOUBLE",
             *(

@@ -32,6 +32,7 @@ class Drives:
     def __init__(self) -> None:
         self.grades: list[Grade] = []
         self._grader: DriveGrader | None = None
+        self._asked_mps: float | None = None  # before the first position of a drive
         self._recent: deque[TrackFix] = deque(maxlen=_MOST_RECENT)
 
     def drive(
@@ -47,11 +48,19 @@ class Drives:
         """Take positions that were all driven in one situation, their points in the frame, and what the track to each keeps to the fence."""
         if not _is_driving(situation):
             self.end()
+            self._asked_mps = None
         elif self._grader is None:
             self._begin(situation, fixes[0], GradedField(frame, meter, vehicle))
         if self._grader is not None:
             self._grader.drive(fixes, points, clearances_m)
         self._recent.extend(fixes)
+
+    def change_speed(self, situation: Situation, speed_mps: float) -> None:
+        """Note that the vehicle took a speed from a station; what was driven before was handed over. In other modes it changes no drive: AUTO begins at its own speed."""
+        if self._grader is not None:
+            self._grader.change_speed(speed_mps)
+        elif _is_driving(situation):
+            self._asked_mps = speed_mps
 
     def reached(self, seq: int) -> None:
         """Note that a mission item was reached at the latest position."""
@@ -77,6 +86,9 @@ class Drives:
             return
         before = self._from_standing(first)
         self._grader = DriveGrader(way, before[0] if before else first, field)
+        asked_mps, self._asked_mps = self._asked_mps, None
+        if asked_mps is not None:
+            self._grader.change_speed(asked_mps)
         if before:
             points = field.frame.to_local_array([fix.position for fix in before])
             clearances_m = field.meter.at_points(points) if field.meter else None

@@ -6,6 +6,7 @@ What is predicted comes from the drive model (`missions.drive_model`), for the m
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -130,11 +131,12 @@ class Grade:
 
 
 class MissionWay(NamedTuple):
-    """A mission as a drive: the waypoints to come, each with its seq; the speed asked for on the leg to each; stops; what is odd."""
+    """A mission as a drive: the waypoints to come, each with its seq; the speed asked for on the leg to each, and before which legs an item asks; stops; what is odd."""
 
     seqs: tuple[int, ...]
     positions: tuple[LatLon, ...]
     speeds: tuple[float | None, ...]
+    asked_before: frozenset[int]
     stops: dict[int, float]
     odd: str | None
 
@@ -163,10 +165,13 @@ def way_of(
     seqs = [leg.last_item - 1 + int(home_first) for leg in legs]
     to_come = [(seq, leg) for seq, leg in zip(seqs, legs, strict=True) if seq >= first_item]
     circled = next((seq for seq, leg in to_come if leg.circle_m), None)
+    asking = [seq for seq, item in numbered if item.command == Command.DO_CHANGE_SPEED and item.params[1] > 0]
+    to_come_seqs = [seq for seq, _ in to_come]
     return MissionWay(
-        seqs=tuple(seq for seq, _ in to_come),
+        seqs=tuple(to_come_seqs),
         positions=tuple(leg.end for _, leg in to_come),
         speeds=tuple(leg.speed_mps for _, leg in to_come),
+        asked_before=frozenset(bisect_left(to_come_seqs, seq) for seq in asking),
         stops={number: leg.stop_s for number, (_, leg) in enumerate(to_come, 1) if leg.stop_s},
         odd=f"item {odd[0]} (MAV_CMD {odd[1].command})"
         if odd is not None
@@ -238,7 +243,10 @@ class DriveGrader:
             self._notes.append(
                 f"the drive began at {start.speed_mps:.1f} m/s; the prediction is for a start from rest"
             )
-        self._forecast = self._foresee(start.heading_deg if start.speed_mps <= STANDING_MPS else None)
+        self._speeds = way.speeds
+        self._mixed: set[int] = set()
+        self._heading_deg = start.heading_deg if start.speed_mps <= STANDING_MPS else None
+        self._forecast = self._foresee()
         self._windows = np.array(
             [
                 LineString(self._points[max(0, leg - 1) : leg + 3])  # the leg, the one before, the one after
@@ -272,8 +280,21 @@ class DriveGrader:
         if self._forecast is not None:
             outside_m = np.asarray(shapely.distance(places, self._forecast.area))
             tally.outside_m = max(tally.outside_m, float(outside_m.max()))
-        self._legs.take(track, legs, outside_m)
+        self._legs.take(track, np.array([fix.speed_mps for fix in fixes]), legs, outside_m)
         self._last = fixes[-1]
+
+    def change_speed(self, speed_mps: float) -> None:
+        """Note a speed that a station asked for: it holds until an item of the mission asks for another (both set the same: Rover/mode_auto.cpp, set_desired_speed)."""
+        now = min(int(np.searchsorted(self._seqs, self._last.item)), len(self._seqs) - 1)
+        end = min((leg for leg in self.way.asked_before if leg > now), default=len(self._speeds))
+        changed = (*self._speeds[:now], *(speed_mps,) * (end - now), *self._speeds[end:])
+        if changed == self._speeds:
+            return
+        self._speeds = changed
+        if self._tally.fixes:
+            self._mixed.add(now)
+        if self._forecast is not None:
+            self._forecast = self._foresee()
 
     def reached(self, seq: int, boot_s: float) -> None:
         """Note that a mission item was reached, by MISSION_ITEM_REACHED."""
@@ -306,30 +327,31 @@ class DriveGrader:
             mean_deviation_m=tally.sum_m / tally.fixes,
             outside_m=None if forecast is None else tally.outside_m,
             foreseen=None if forecast is None else self._foreseen(forecast, last_reached),
-            notes=tuple(self._notes),
+            notes=tuple(dict.fromkeys(self._notes)),
             legs=self._legs.finish(
                 way.seqs[: tally.farthest],
-                [self._field.vehicle.speed_mps if asked is None else asked for asked in way.speeds][
+                [self._field.vehicle.speed_mps if asked is None else asked for asked in self._speeds][
                     : tally.farthest
                 ],
                 forecast,
+                self._mixed,
             ),
         )
 
-    def _foresee(self, heading_deg: float | None) -> Envelope | None:
+    def _foresee(self) -> Envelope | None:
         if self.way.odd is not None:
             self._notes.append(f"no prediction: the drive model does not cover {self.way.odd}")
             return None
         if self._field.vehicle.autopilot is not Autopilot.ARDUPILOT:
-            reasons = beyond_measured(self._field.vehicle, *self.way.speeds)
+            reasons = beyond_measured(self._field.vehicle, *self._speeds)
             more = f"; and {len(reasons) - 1} more" if len(reasons) > 1 else ""
             self._notes += [f"the prediction is extrapolated: {reason}{more}" for reason in reasons[:1]]
         try:
             forecast = envelope(
                 self._points,
                 self._field.vehicle,
-                heading_deg=heading_deg,
-                speeds=self.way.speeds,
+                heading_deg=self._heading_deg,
+                speeds=self._speeds,
                 stops=self.way.stops,
             )
             if self._field.meter is not None:

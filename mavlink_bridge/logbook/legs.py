@@ -10,7 +10,7 @@ import numpy as np
 from missions.geo import change_deg
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
@@ -33,7 +33,10 @@ class GradedLeg:
         The mission item (by seq) that it leads to.
     length_m : float
     speed_mps : float
-        The speed asked for.
+        The speed in force: the mission's, or of a DO_CHANGE_SPEED that a station sent since.
+    driven_mps : float or None
+        The fastest it was in its middle third; None where no position lies there, and below where nothing could be predicted.
+    foreseen_driven_mps : float or None
     straight_m : float or None
         The farthest off its line in its middle third; None where no position lies there.
     foreseen_straight_m : float or None
@@ -58,6 +61,8 @@ class GradedLeg:
     item: int
     length_m: float
     speed_mps: float
+    driven_mps: float | None
+    foreseen_driven_mps: float | None
     straight_m: float | None
     foreseen_straight_m: float | None
     turn_deg: float | None
@@ -97,6 +102,7 @@ class LegMeter:
             ]
         )
         self._straight_m = np.full(count, np.nan)
+        self._driven_mps = np.full(count, np.nan)
         self._inside_m = np.zeros(count)  # of the corner at each leg's end
         self._outside_m = np.zeros(count)
         self._beyond_m = np.zeros((2, count))  # inside and outside
@@ -104,7 +110,11 @@ class LegMeter:
         self._is_passed = np.zeros(count + 1, dtype=bool)  # by leg: some position lies beyond its middle
 
     def take(
-        self, track: NDArray[np.float64], legs: NDArray[np.intp], beyond_m: NDArray[np.float64] | None
+        self,
+        track: NDArray[np.float64],
+        speeds_mps: NDArray[np.float64],
+        legs: NDArray[np.intp],
+        beyond_m: NDArray[np.float64] | None,
     ) -> None:
         """Take positions.
 
@@ -112,6 +122,8 @@ class LegMeter:
         ----------
         track : ndarray of float, shape (n + 1, 2)
             The position before, then those driven since.
+        speeds_mps : ndarray of float, shape (n,)
+            As the vehicle reported them.
         legs : ndarray of int, shape (n,)
             Which leg each was driven on, by the mission item then. The autopilot begins the next leg before its corner.
         beyond_m : ndarray of float, shape (n,), or None
@@ -122,6 +134,7 @@ class LegMeter:
         nearest, share, aside_m = self._beside(places, legs)
         is_middle = (share > _MIDDLE[0]) & (share < _MIDDLE[1])
         np.fmax.at(self._straight_m, nearest[is_middle], np.abs(aside_m[is_middle]))
+        np.fmax.at(self._driven_mps, nearest[is_middle], speeds_mps[is_middle])
         np.maximum.at(self._gaps_m, nearest, steps_m)
         corner = np.where(share >= 0.5, nearest, nearest - 1)  # the corner at the end of which leg
         self._is_passed[nearest[share >= 0.5]] = True
@@ -155,7 +168,11 @@ class LegMeter:
         return best, share, aside_m
 
     def finish(
-        self, items: Sequence[int], speeds_mps: Sequence[float], forecast: Envelope | None
+        self,
+        items: Sequence[int],
+        speeds_mps: Sequence[float],
+        forecast: Envelope | None,
+        mixed: Collection[int] = (),
     ) -> tuple[GradedLeg, ...]:
         """Return the legs that were driven to.
 
@@ -164,9 +181,11 @@ class LegMeter:
         items : sequence of int
             The seq that each leg leads to, as far as the vehicle came.
         speeds_mps : sequence of float
-            Asked for on each leg.
+            In force on each leg.
         forecast : Envelope or None
             What was predicted for all of it.
+        mixed : collection of int
+            Legs on which the speed in force changed: the corner at their end may have been driven at either.
         """
         told_corners = {corner.waypoint: corner for corner in forecast.corners} if forecast else {}
         told_legs = {leg.first: leg for leg in forecast.legs} if forecast else {}
@@ -174,12 +193,14 @@ class LegMeter:
         for number, (item, speed_mps) in enumerate(zip(items, speeds_mps, strict=True)):
             corner, leg = told_corners.get(number + 1), told_legs.get(number)
             has_corner = number < len(self._turns_deg)
-            straight_m = float(self._straight_m[number])
+            straight_m, driven_mps = float(self._straight_m[number]), float(self._driven_mps[number])
             graded.append(
                 GradedLeg(
                     item=item,
                     length_m=float(self._lengths_m[number]),
                     speed_mps=speed_mps,
+                    driven_mps=None if np.isnan(driven_mps) else driven_mps,
+                    foreseen_driven_mps=None if leg is None else leg.top_speed_mps,
                     straight_m=None if np.isnan(straight_m) else straight_m,
                     foreseen_straight_m=None if leg is None else max(leg.left_m, leg.right_m),
                     turn_deg=float(self._turns_deg[number]) if has_corner else None,
@@ -190,7 +211,7 @@ class LegMeter:
                     foreseen_outside_overshoot_m=None if corner is None else corner.outside_overshoot_m,
                     inside_beyond_m=None if corner is None else float(self._beyond_m[0, number]),
                     outside_beyond_m=None if corner is None else float(self._beyond_m[1, number]),
-                    is_bounded=None if corner is None else corner.bounded,
+                    is_bounded=None if corner is None else corner.bounded and number not in mixed,
                     gap_m=float(self._gaps_m[number : number + 2].max()),
                     is_whole=bool(
                         self._is_passed[number] and (self._is_passed[number + 1] or not has_corner)

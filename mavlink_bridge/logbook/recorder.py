@@ -26,6 +26,7 @@ from mavlink_bridge.mavlink.autopilots import autopilot_of
 from mavlink_bridge.mavlink.modes import mode_name
 from missions.geo import LatLon, distance_m
 from missions.ground.frame import MAX_LATITUDE_DEG, frame_around
+from missions.items import Command
 from missions.vehicle import PARAMETER_NAMES, PX4_PREFIXES
 from missions.vehicle.parameter_remarks import no_number_remarks, range_remarks
 from missions.vehicle.parameters import PX4_NAMES
@@ -45,7 +46,11 @@ T = TypeVar("T")
 TrackTaker = Callable[[int, str, bool, Sequence["TrackFix"], "NDArray[np.float64] | None"], None]
 """Takes positions batch by batch: of which system, in which mode, whether armed, and what the track to each keeps to the fence."""
 
-RECORDED = FOLDED | TRANSFER_TYPES | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus}
+RECORDED = (
+    FOLDED
+    | TRANSFER_TYPES
+    | {m.MissionCurrent, m.MissionItemReached, m.FenceStatus, m.CommandInt, m.CommandLong, m.CommandAck}
+)
 """The message types that a recorder looks at."""
 
 _BATCH: Final = 4096  # positions measured against the fence at once; chosen, it changes no answer
@@ -85,6 +90,7 @@ class VehicleRecorder:
         self._before: TrackFix | None = None
         self._positions = self._without_fix = 0
         self._item = 0
+        self._asked_mps: float | None = None
         self._frame: LocalFrame | None = None
         self._odometer = Odometer()
         self._notes: dict[str, None] = {}
@@ -102,6 +108,8 @@ class VehicleRecorder:
         if isinstance(frame.message, m.ParamValue) and frame.system == before.system:
             self._seen_parameters.add(frame.message.param_id)
         self._transfers.look(frame, now_s)
+        if isinstance(frame.message, m.CommandInt | m.CommandLong):
+            self._take_command(frame.message)
         if (frame.system, frame.component) == (before.system, before.component):
             self._take_own(frame.message, now_s)
 
@@ -221,11 +229,27 @@ class VehicleRecorder:
         elif isinstance(message, m.MissionItemReached):
             self._flush()
             self._drives.reached(message.seq)
+        elif isinstance(message, m.CommandAck):
+            self._take_answer(message)
         elif isinstance(message, m.FenceStatus):
             self._fence.take_status(message, now_s)
         elif isinstance(message, m.Statustext):
             rules = autopilot_of(ardupilot=self.situation.ardupilot).incidents
             self._fence.take_text(message.text, rules, now_s)
+
+    def _take_command(self, message: m.CommandInt | m.CommandLong) -> None:
+        is_ours = message.target_system in (0, self.situation.system)
+        if is_ours and message.command == Command.DO_CHANGE_SPEED:
+            self._asked_mps = message.param2
+
+    def _take_answer(self, message: m.CommandAck) -> None:
+        """Take over a speed that the vehicle accepts; one below 0 changes nothing."""
+        if message.command != Command.DO_CHANGE_SPEED:
+            return
+        asked_mps, self._asked_mps = self._asked_mps, None
+        if asked_mps is not None and asked_mps > 0 and message.result == m.MavResult.ACCEPTED:
+            self._flush()
+            self._drives.change_speed(self.situation, asked_mps)
 
     def _take_item(self, item: int) -> None:
         if 0 < item < self._item:  # begun anew, or jumped back: another drive

@@ -486,7 +486,7 @@ TABLES = {
     "verified_upload": _with_ends(VERIFIED_UPLOAD),
     "parameters": _with_ends(PARAMETERS),
     "command": _with_ends(COMMAND),
-    "mode_switch": _with_ends(MODE_SWITCH),
+    "mode_switch": _with_ends(MODE_SWITCH_BY_HEARTBEAT),  # the others have some of its steps
     "version": _with_ends(VERSION),
 }
 """All tables by name, for the documentation and the tests."""

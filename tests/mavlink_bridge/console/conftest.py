@@ -29,8 +29,9 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture
 def browser(chromium: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """One test at a time, of all workers: two of them draw software WebGL so slowly that a page counts as gone, and has lost control."""
-    with (tmp_path_factory.getbasetemp().parent / "browser.lock").open("ab") as file:
-        while not lock_file(file):
+    """Two tests at a time, of all workers: three of them draw software WebGL so slowly that a page counts as gone, and has lost control."""
+    folder = tmp_path_factory.getbasetemp().parent
+    with (folder / "browser-1.lock").open("ab") as one, (folder / "browser-2.lock").open("ab") as other:
+        while not (lock_file(one) or lock_file(other)):
             time.sleep(0.1)
         yield chromium

@@ -8,6 +8,7 @@ import shutil
 
 import numpy as np
 import pytest
+from logbook.making import Log
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
@@ -79,6 +80,7 @@ def test_corners_are_parted_into_classes():
         "beyond_m": np.concatenate((np.zeros(count), [0.25])),
         "gap_m": np.full(count + 1, 0.5),
         "is_bounded": all_of(count + 1),
+        "is_at_speed": all_of(count + 1),
     }
     gentle, sharp = corner_classes(columns, Vehicle(), all_of(count + 1))
     assert (gentle.turn_from_deg, gentle.corners, gentle.inside_more_m, gentle.beyond_m) == (
@@ -92,6 +94,8 @@ def test_corners_are_parted_into_classes():
     seldom = {**columns, "gap_m": np.full(count + 1, 1.5)}
     assert corner_classes(seldom, Vehicle(), all_of(count + 1))[1].inside_more_m == 0.0
     assert corner_classes(columns, Vehicle(), ~all_of(count + 1))[1].inside_more_m == 0.0
+    slowed = {**columns, "is_at_speed": ~all_of(count + 1)}
+    assert corner_classes(slowed, Vehicle(), all_of(count + 1))[1].inside_more_m == 0.0
 
 
 def test_legs_only_widen():
@@ -147,8 +151,8 @@ def test_from_logs_to_a_plan(fleet, tmp_path, fields):
     )
 
 
-def made_dataset(folder, logs):
-    """Return a dataset of 402 equal corners of vehicle 1 in two logs; each log is (begins_s, firmware, parameters, name of a changed one)."""
+def made_dataset(folder, logs, **other):
+    """Return a dataset of 402 equal corners of vehicle 1 in two logs; each log is (begins_s, firmware, parameters, name of a changed one); ``other`` of their legs."""
     dataset = Dataset(folder)
     database = dataset.begin()
     rows = {name: [] for name in TABLES}
@@ -173,8 +177,10 @@ def made_dataset(folder, logs):
             "drive": 1, "item": 2, "length_m": 30.0, "speed_mps": 2.0, "straight_m": 0.1, "predicted_straight_m": 0.3, "turn_deg": 110.0,
             "stands": False, "inside_cut_m": 0.1, "outside_overshoot_m": 0.1, "predicted_inside_cut_m": 0.9, "predicted_outside_overshoot_m": 0.9,
             "inside_beyond_m": 0.0, "outside_beyond_m": 0.0, "is_bounded": True, "gap_m": 0.4, "is_whole": True,
+            "driven_mps": 1.9, "predicted_driven_mps": 2.0, **other,
         }  # fmt: skip
         rows["legs"] += [row("legs", leg=leg_number, **leg) for leg_number in range(1, 202)]
+        rows["legs"].append(row("legs", leg=202, **{**leg, "turn_deg": None}))
     dataset.stage(database, rows)
     dataset.publish(database)
     database.close()
@@ -209,3 +215,38 @@ def test_only_corners_known_to_be_of_this_rover_as_it_is_narrow(tmp_path, first,
     assert one.corners == 402
     assert (one.inside_more_m < 0) == narrows
     assert said in " ".join(found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("driven_mps", "narrows"), [(1.81, True), (2.19, True), (1.0, False), (2.5, False), (None, False)]
+)
+def test_corners_slowed_by_what_the_log_does_not_tell_narrow_nothing(tmp_path, driven_mps, narrows):
+    """By a hand on the throttle, by mud: they are gentler than those at the speed in force."""
+    logs = [(0.0, "4.6.3", TUNE, None), (LATER_S, "4.6.3", TUNE, None)]
+    found = calibrate(made_dataset(tmp_path / "dataset", logs, driven_mps=driven_mps), None)
+    (one,) = found.calibration.corners
+    assert (one.inside_more_m < 0) == narrows
+    assert ("driven slower or faster than predicted" in " ".join(found.remarks)) != narrows
+
+
+SQUARE = [(0.0, 0.0), (0.0, 30.0), (30.0, 30.0), (30.0, 0.0), (0.0, 0.0)]
+
+
+def test_corners_that_a_station_slowed_are_of_the_class_of_their_speed(tmp_path):
+    """Half of the drives of a mission at 2 m/s were driven at 1 m/s, by DO_CHANGE_SPEED: at 2 m/s they count nothing."""
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    for number, speed_mps in enumerate((2.0, 1.0)):
+        log = Log(now_s=number * 1000.0)
+        log.heartbeat()
+        log.parameters({**TUNE, "WP_SPEED": 2.0, "FENCE_ENABLE": 0.0})
+        log.mission(SQUARE[1:])
+        log.position(*SQUARE[0])
+        log.drive(SQUARE, speed_mps=speed_mps, asked_mps=None if speed_mps == 2.0 else speed_mps)
+        log.write(folder / f"{number}.tlog")
+    with open_workers(1) as workers:
+        build(Dataset(tmp_path / "dataset"), log_files([folder]), workers)
+    found = calibrate(Dataset(tmp_path / "dataset"), None)
+    counted = {(one.speed_from_mps, one.turn_from_deg): one.corners for one in found.calibration.corners}
+    assert counted == {(1.0, 90.0): 3, (2.0, 90.0): 3}
+    assert not any("driven slower" in remark for remark in found.remarks)

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from dataset.every_row import every_row
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
@@ -35,14 +36,6 @@ def pbpp(*words: object) -> tuple[int, str]:
 def built(dataset: Path, *places: Path, jobs: int = 1) -> object:
     with open_workers(jobs) as workers:
         return build(Dataset(dataset), log_files(places), workers)
-
-
-def every_row(dataset: Path) -> dict[str, list[str]]:
-    """All rows of all tables, sorted: what a dataset is, however its files are cut."""
-    database = Dataset(dataset).open()
-    rows = {name: sorted(map(repr, database.execute(f"SELECT * FROM {name}").fetchall())) for name in TABLES}
-    database.close()
-    return rows
 
 
 @pytest.fixture(scope="module")
@@ -266,15 +259,13 @@ def seven(place, tmp_path_factory):
 
 
 class TestKilled:
-    """kill -9 at any place: built again, it is the same dataset."""
+    """kill -9 of `pbpp logs build` at any place: built again, it is the same dataset."""
 
     SCRIPT = """
 import sys, os
 from pathlib import Path
-from mavlink_bridge.dataset.build import build, log_files
-from mavlink_bridge.dataset.store import Dataset
 import mavlink_bridge.dataset.build as b
-from mavlink_bridge.many import open_workers
+from mavlink_bridge.cli.app import app
 b._A_TASK, b._A_BATCH, b._A_LOAD = 1, 2, 4
 left = int(sys.argv[3])
 def dying(kind):
@@ -287,17 +278,21 @@ def dying(kind):
     return hook
 for name in ("rename", "replace", "unlink", "mkdir"):
     setattr(Path, name, dying(getattr(Path, name)))
-with open_workers(1) as w:
-    build(Dataset(Path(sys.argv[1])), log_files([Path(sys.argv[2])]), w)
+app(["logs", "build", sys.argv[2], "-o", sys.argv[1], "--jobs", "1", "-q"], standalone_mode=False)
+print(left)
 """
+    EVER = 10_000  # steps, more than any build has
 
     def run(self, dataset, folder, steps):
+        """Build until so many changes of the folder's files are done; return how many were left, None where it was killed."""
         done = subprocess.run(
             [sys.executable, "-c", self.SCRIPT, str(dataset), str(folder), str(steps)],
             check=False,
             capture_output=True,
+            text=True,
         )
-        return done.returncode
+        assert done.returncode in (0, -signal.SIGKILL), done.stderr
+        return int(done.stdout.split()[-1]) if done.returncode == 0 else None
 
     @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.campaign)])
     def test_at_places_drawn_at_random(self, seven, tmp_path, seed):
@@ -305,9 +300,23 @@ with open_workers(1) as w:
         dataset = tmp_path / "dataset"
         kills = 0
         for _ in range(3):
-            kills += self.run(dataset, seven, rng.randrange(60)) == -signal.SIGKILL
+            kills += self.run(dataset, seven, rng.randrange(60)) is None
         assert kills
-        built(dataset, seven)
+        self.assert_whole(dataset, seven)
+
+    @pytest.mark.campaign
+    def test_ten_builds_each_at_another_place(self, seven, tmp_path):
+        steps = self.EVER - self.run(tmp_path / "undisturbed", seven, self.EVER)
+        assert steps > 60
+        for place in random.Random(2).sample(range(steps), 10):
+            dataset = tmp_path / f"killed at {place}"
+            assert self.run(dataset, seven, place) is None
+            self.assert_whole(dataset, seven)
+
+    def assert_whole(self, dataset, seven):
+        """Build again; then every row is there once, and no file is left over."""
+        code, _ = pbpp("logs", "build", seven, "-o", dataset, "--jobs", "1", "-q")
+        assert code == 0
         assert every_row(dataset) == every_row(seven.parent / "whole")
         listed = json.loads((dataset / "pbpp-dataset.json").read_text())["files"]
         there = {path.relative_to(dataset).as_posix() for path in dataset.rglob("*.parquet")}
@@ -321,7 +330,7 @@ def test_what_is_no_dataset_is_refused(tmp_path):
     with pytest.raises(DatasetError, match="there is no dataset"):
         Dataset(tmp_path / "none").open()
     (tmp_path / "pbpp-dataset.json").write_text('{"schema": 99, "files": {}, "published": []}')
-    with pytest.raises(DatasetError, match="schema 99; this program reads and writes schema 1"):
+    with pytest.raises(DatasetError, match="schema 99; this program reads and writes schema 2"):
         Dataset(tmp_path)
     (tmp_path / "pbpp-dataset.json").write_text("[]")
     with pytest.raises(DatasetError, match="cannot be read"):

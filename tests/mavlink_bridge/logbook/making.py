@@ -16,7 +16,7 @@ from mavlink_bridge.tlog import SENT_LINK, TlogWriter
 from missions.fence import Fence, PolygonZone, ZoneKind, fence_to_items
 from missions.geo import LatLon, LocalPoint
 from missions.ground.frame import LocalFrame
-from missions.items import MissionItem, waypoint, with_home
+from missions.items import Command, MissionItem, waypoint, with_home
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,16 +89,23 @@ class Log:
         vx = round(speed_mps * 100)
         self.row(ROVER, m.GlobalPositionInt(boot_ms, lat_e7, lon_e7, vx=vx, hdg=hdg))
 
+    def change_speed(self, speed_mps: float, result: int = 0) -> None:
+        self.row(STATION, m.CommandLong(*ROVER, Command.DO_CHANGE_SPEED, param2=speed_mps))
+        self.row(ROVER, m.CommandAck(Command.DO_CHANGE_SPEED, result))
+
     def drive(
         self,
         points: Sequence[tuple[float, float]],
         speed_mps: float = 2.0,
         mode: int = Mode.AUTO,
         first_item: int = 1,
+        asked_mps: float | None = None,
     ) -> None:
-        """Stand, then drive along lines; each end of a line reaches the next item."""
+        """Stand, asked for another speed or not, then drive along lines; each end of a line reaches the next item."""
         self.heartbeat(mode, armed=True)
         self.row(ROVER, m.MissionCurrent(first_item))
+        if asked_mps is not None:
+            self.change_speed(asked_mps)
         self.position(*points[0])
         self.now_s += 0.2
         for item, (a, b) in enumerate(itertools.pairwise(points), start=first_item):

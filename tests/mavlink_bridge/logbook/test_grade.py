@@ -14,7 +14,7 @@ from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
 from missions.fence import Fence
 from missions.firmware import Firmware
-from missions.items import Command, MissionItem, waypoint, with_home
+from missions.items import Command, MissionItem, change_speed, waypoint, with_home
 from missions.vehicle import Autopilot, Pursuit, Vehicle
 
 LINES = [(0.0, 0.0), (0.0, 30.0), (40.0, 30.0)]
@@ -259,3 +259,64 @@ def test_hardly_moving_is_no_drive(tmp_path):
     for _ in range(5):
         log.position(0.0, 0.1)
     assert read(log, tmp_path).grades == ()
+
+
+CORNERS = [(0.0, 0.0), (0.0, 30.0), (30.0, 30.0), (30.0, 0.0), (0.0, 0.0)]
+
+
+def speeds_of(grade):
+    return [leg.speed_mps for leg in grade.legs]
+
+
+def test_a_speed_that_a_station_asked_for_is_that_of_its_legs(tmp_path):
+    """DO_CHANGE_SPEED as a command, on the third leg: what was predicted for slower legs, and a corner that may have been driven at either speed is not bounded."""
+    plain, slowed = begun(fence=None, lines=CORNERS), begun(fence=None, lines=CORNERS)
+    for log in (plain, slowed):
+        log.drive(CORNERS[:3])
+        log.row(ROVER, m.MissionCurrent(3), 0.0)
+        log.position(30.0, 25.0, 2.0)
+        if log is slowed:
+            log.change_speed(4.0, result=4)  # failed
+            log.change_speed(-1.0)  # no change
+            log.change_speed(1.0)
+        log.drive([(30.0, 24.0), *CORNERS[3:]], speed_mps=1.0 if log is slowed else 2.0, first_item=3)
+    (before,) = read(plain, tmp_path).grades
+    (tmp_path / "slowed").mkdir()
+    (after,) = read(slowed, tmp_path / "slowed").grades
+    assert speeds_of(before) == [2.0, 2.0, 2.0, 2.0]
+    assert speeds_of(after) == [2.0, 2.0, 1.0, 1.0]
+    assert [leg.is_bounded for leg in before.legs] == [True, True, True, None]
+    assert [leg.is_bounded for leg in after.legs] == [True, False, False, None]
+    assert [leg.driven_mps for leg in after.legs] == [2.0, 2.0, 1.0, 1.0]
+    assert [leg.foreseen_driven_mps for leg in after.legs] == pytest.approx([2.0, 2.0, 1.0, 1.0], abs=0.05)
+    assert after.legs[0] == before.legs[0]
+    assert after.legs[2].foreseen_inside_cut_m < before.legs[2].foreseen_inside_cut_m
+    assert after.foreseen.took_s > before.foreseen.took_s + 20.0
+    assert after.notes == before.notes
+
+
+def test_a_speed_asked_for_before_the_first_position_holds_from_the_first_leg_on(tmp_path):
+    log = begun(fence=None, lines=CORNERS)
+    log.drive(CORNERS, speed_mps=1.0, asked_mps=1.0)
+    (grade,) = read(log, tmp_path).grades
+    assert speeds_of(grade) == [1.0] * 4
+    assert [leg.is_bounded for leg in grade.legs] == [True, True, True, None]
+
+
+def test_an_item_that_asks_for_a_speed_ends_that_of_a_station(tmp_path):
+    items = [waypoint(place(*point)) for point in CORNERS[1:]]
+    items.insert(2, change_speed(3.0))
+    log = begun(fence=None)
+    log.upload(m.MissionType.MISSION, with_home(items, ORIGIN))
+    log.drive(CORNERS[:3], speed_mps=1.0, asked_mps=1.0)
+    log.drive(CORNERS[2:], speed_mps=3.0, first_item=4)
+    (grade,) = read(log, tmp_path).grades
+    assert speeds_of(grade) == [1.0, 1.0, 3.0, 3.0]
+
+
+def test_a_speed_asked_for_in_another_mode_changes_no_drive(tmp_path):
+    log = begun(fence=None, lines=CORNERS)
+    log.drive(CORNERS[:2], mode=Mode.GUIDED, asked_mps=1.0)
+    log.drive(CORNERS)
+    (grade,) = read(log, tmp_path).grades
+    assert speeds_of(grade) == [2.0] * 4

@@ -11,12 +11,15 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from dataset.every_row import every_row
 from distributed import KilledWorker
 from many import work
 from many.dask_processes import dask_cluster, other_version
 from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
+from mavlink_bridge.dataset.build import build, log_files
+from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import ClusterError, LostWorkerError
 from mavlink_bridge.many import Task, open_workers, parcel
 from mavlink_bridge.many.cluster import Cluster, check_versions, open_cluster
@@ -110,16 +113,38 @@ def test_by_hand_with_two_workers_one_of_which_is_killed_and_one_of_another_vers
 
 
 @pytest.mark.campaign
-def test_the_same_with_any_number_of_workers(logs, tmp_path):
+def test_the_same_with_processes_and_with_one_two_and_four_workers_one_of_which_is_killed(
+    logs, tmp_path, monkeypatch
+):
     names = sorted(map(str, logs.glob("*.tlog")))[::2]
     here = run("replay", *names, "--json", "--jobs", "1")
+    assert run("replay", *names, "--json", "--jobs", "2").stdout == here.stdout
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    data = (logs / "no-fence.tlog").read_bytes()
+    for number in range(40):
+        (folder / f"{number:02}.tlog").write_bytes(data[: len(data) - 500 * number])
+    assert run("logs", "build", str(folder), "-o", str(tmp_path / "here"), "--jobs", "2").exit_code == 0
     with dask_cluster(tmp_path, 1) as cluster:
-        for count in (1, 3):
+        for count in (1, 2, 4):
             while len(cluster.workers) < count:
                 cluster.add_worker()
             cluster.wait_for(count)
             there = run("replay", *names, "--json", "--cluster", cluster.address)
             assert (there.exit_code, there.stdout) == (here.exit_code, here.stdout)
+
+        monkeypatch.setattr("mavlink_bridge.dataset.build._A_TASK", 1)  # so that each worker has some
+        victim = cluster.workers[0]
+
+        def kill_one(progress):
+            if progress.read == 3:
+                victim.kill()
+
+        with open_workers(cluster=cluster.address) as workers:
+            progress = build(Dataset(tmp_path / "there"), log_files([folder]), workers, kill_one)
+        assert victim.wait(timeout=10) != 0
+        assert (progress.read, progress.bad) == (40, [])
+        assert every_row(tmp_path / "there") == every_row(tmp_path / "here")
 
 
 def test_versions_that_differ_are_refused_by_name():

@@ -54,7 +54,7 @@ _CODES = {
 
 _HUNDREDTHS = "cCeE"
 _TEXTS = "nNZ"
-_NUMBERS = "bBhHiIqQfdcCeELM"
+_NUMBERS = "bBhHiIqQfcCeELM"  # no double: it may hold more than a message of telemetry can
 
 _NEEDED: dict[str, tuple[str, ...]] = {
     "PARM": ("Name", "Value"),

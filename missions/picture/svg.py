@@ -87,7 +87,7 @@ def _path(line: NDArray[np.float64]) -> str:
     steps = places.copy()
     steps[1:] -= places[:-1]
     (x, y), *others = (steps / 100).tolist()
-    return f"M{x:g},{y:g}" + "".join(f"l{dx:g},{dy:g}" for dx, dy in others)
+    return f"M{_number(x)},{_number(y)}" + "".join(f"l{_number(dx)},{_number(dy)}" for dx, dy in others)
 
 
 def _number(value: float) -> str:

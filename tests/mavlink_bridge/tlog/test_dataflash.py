@@ -227,6 +227,26 @@ def test_numbers_that_are_none(tmp_path, value):
     assert [(one.lat, one.lon) for one in placed] == [HOME, HOME]
 
 
+def test_doubles_that_no_telemetry_message_holds_are_passed_over(tmp_path):
+    """A log that declares a parameter's value as a double may hold one that PARAM_VALUE cannot; no firmware writes doubles there."""
+    kind, labels = 200, b"TimeUS,Name,Value"
+    layout = struct.pack("<BB4s16s64s", kind, 3 + 8 + 16 + 8, b"PARM", b"QNd", labels)
+    path = tmp_path / "double.bin"
+    path.write_bytes(
+        declarations()
+        + message("MSG", 1_000_000, "ArduRover V4.6.3")
+        + b"\xa3\x95\x80"
+        + layout
+        + b"\xa3\x95"
+        + bytes([kind])
+        + struct.pack("<Q16sd", 1_000_000, b"WP_SPEED", 1e300)
+        + message("POS", 2_000_000, *HOME, 0.0, 0.0, 0.0)
+    )
+    told = [entry.frame.message for entry in TlogReader(path) if entry.frame]
+    assert not any(isinstance(one, m.ParamValue) for one in told)
+    assert any(isinstance(one, m.GlobalPositionInt) for one in told)
+
+
 def test_a_damaged_time_ends_no_heartbeats(tmp_path):
     path = tmp_path / "time.bin"
     times_us = [1_000_000, 1 << 63, 9_000_000_000, 2_000_000, 3_500_000]

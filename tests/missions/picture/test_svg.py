@@ -18,7 +18,7 @@ from missions.picture import font
 from missions.picture.drawing import DrawnPage, Look, Outlines, Spot, Words
 from missions.picture.page import scene_drawing
 from missions.picture.plans import plan_scene
-from missions.picture.svg import svg_bytes
+from missions.picture.svg import _path, svg_bytes
 
 if TYPE_CHECKING:
     from missions.picture.scene import PictureScene
@@ -115,3 +115,10 @@ def test_widths_are_those_of_the_font() -> None:
             assert font.width_pt(character, 1000) >= advance
     assert font.width_pt("道", 10) == 10
     assert font.width_pt("e\u0301", 10) == pytest.approx(font.width_pt("e", 10))
+
+
+def test_lines_from_far_outside_the_frame_come_in_at_their_place():
+    """A path's points are told from one to the next: what the first one lacks, all that follow would be off by."""
+    path = _path(np.array([[-1234564.25, 12345.67], [10.5, 20.25], [30.0, 40.0]]))
+    told = [tuple(map(float, step.split(","))) for step in path[1:].split("l")]
+    assert np.cumsum(told, axis=0)[1:] == pytest.approx(np.array([[10.5, 20.25], [30.0, 40.0]]), abs=0.006)

@@ -254,8 +254,9 @@ def _start(array: NDArray[np.float64], vehicle: Vehicle, heading_deg: float | No
     if step is None:
         return Stray(), 0.0
     if heading_deg is None:
-        swing_m = at_corner.start_swing_m(vehicle, 180.0)
-        return Stray(swing_m, swing_m), at_corner.start_behind_m(vehicle, 180.0)
+        off_deg = at_corner.UNKNOWN_START_DEG if vehicle.pursuit is None else 180.0
+        swing_m = at_corner.start_swing_m(vehicle, off_deg)
+        return Stray(swing_m, swing_m), at_corner.start_behind_m(vehicle, off_deg)
     east_m, north_m = step[0] - here[0], step[1] - here[1]
     error_deg = (heading_deg - math.degrees(math.atan2(east_m, north_m)) + 180.0) % 360.0 - 180.0
     swing_m = at_corner.start_swing_m(vehicle, error_deg)

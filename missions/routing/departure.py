@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 # Chosen, not measured: a first leg every 15° from the heading on, and its lengths.
 WAYS = 24
 LENGTHS_M = (16.0, 8.0, 4.0)
-ROOM_M = 6.5
-"""With so much more room than it has to keep a vehicle can turn any way: measured swings reach 3.6 m."""
+ROOM_M = 11.0
+"""With so much more room than it has to keep a vehicle can turn any way: it comes at most 10 m behind its start (`missions.drive_model.corner`)."""
 
 
 _MEASURED_START_MPS = 2.0

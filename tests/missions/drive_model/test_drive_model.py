@@ -423,8 +423,12 @@ def test_an_unknown_heading_is_no_better_than_straight_on_short_legs() -> None:
     assert unknown.area.buffer(1e-6).covers(known.area)
 
 
-@given(vehicles, routes, st.floats(-180, 180))
-def test_an_unknown_heading_is_the_worst(vehicle: Vehicle, points: np.ndarray, heading_deg: float) -> None:
+@given(vehicles, routes, st.floats(-176, 176))
+def test_an_unknown_heading_is_the_worst_but_exactly_back(
+    vehicle: Vehicle, points: np.ndarray, off_deg: float
+) -> None:
+    east_m, north_m = points[1] - points[0]
+    heading_deg = math.degrees(math.atan2(east_m, north_m)) + off_deg
     unknown, known = envelope(points, vehicle), envelope(points, vehicle, heading_deg=heading_deg)
     # To a tenth of a millimetre: two unions of many rounded pieces differ by up to 0.03 mm.
     assert unknown.area.buffer(1e-4).covers(known.area)

@@ -136,12 +136,12 @@ def test_a_steered_rover_is_not_sent_where_turning_takes_it_into_the_margin() ->
         return plan(situation, GoTo(target=place(50, 0), clearance_m=2.2))
 
     with pytest.raises(RouteError, match=r"within FENCE_MARGIN 2 m its avoidance takes over") as caught:
-        turned(266.0)
+        turned(270.0)
     assert caught.value.details["advice"].endswith("AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it has turned")
     assert turned(90.0).start_clearance_m is None
     for free in ({"AVOID_ENABLE": 0.0}, {"AVOID_BACKUP_SPD": 0.0}):
-        assert turned(266.0, **free).start_clearance_m < 1.5
-    assert turned(266.0, **SKID).start_clearance_m is None
+        assert turned(270.0, **free).start_clearance_m < 1.5
+    assert turned(270.0, **SKID).start_clearance_m is None
 
 
 def test_a_check_does_not_hold_there() -> None:

@@ -70,9 +70,9 @@ START_SWING_M = (
     (150.0, 1.75),
     (165.0, 2.3),
     (176.5, 2.7),
-    (178.0, 3.2),
-    (180.0, 3.2),
+    (180.0, 2.7),
 )
+EARLY_START_SWING_M = (*START_SWING_M[:-1], (178.0, 3.2), (180.0, 3.2))
 START_BEHIND_M = (
     (0.0, 0.0),
     (90.0, 0.0),
@@ -82,7 +82,8 @@ START_BEHIND_M = (
     (178.0, 10.0),
     (180.0, 10.0),
 )
-"""Heading error in degrees at a start or after a stop; how far off the line, and how far behind the point, at a turning radius of 0.9 m.
+"""Heading error in degrees at a start or after a stop; how far off the line (the second: with firmware before 4.6), and how far behind the point, at a turning radius
+of 0.9 m.
 
 Exactly back the way ahead and the way round balance: ArduPilot drove on for 8.2 m before it turned, half a degree off for 4.5 m, and its compass is a degree
 off or more (tests/missions/drive_model/data/short_starts.csv).
@@ -133,11 +134,24 @@ PIVOT_DOUBT_DEG = 2.0
 
 
 _Table = tuple[tuple[float, ...], ...]
-_START_SWINGS, _START_BEHINDS, _SKID_START_SWINGS, _SKID_START_BEHINDS = (
+(
+    _START_SWINGS,
+    _EARLY_START_SWINGS,
+    _START_BEHINDS,
+    _SKID_START_SWINGS,
+    _SKID_START_BEHINDS,
+    _EARLY_UNSETTLED,
+) = (
     tuple(zip(*rows, strict=True))
-    for rows in (START_SWING_M, START_BEHIND_M, SKID_START_SWING_M, SKID_START_BEHIND_M)
+    for rows in (
+        START_SWING_M,
+        EARLY_START_SWING_M,
+        START_BEHIND_M,
+        SKID_START_SWING_M,
+        SKID_START_BEHIND_M,
+        EARLY_UNSETTLED_M,
+    )
 )
-_EARLY_UNSETTLED = tuple(zip(*EARLY_UNSETTLED_M, strict=True))
 """As columns."""
 
 
@@ -242,7 +256,8 @@ def start_swing_m(vehicle: Vehicle, error_deg: float) -> float:
     """Return how far off its line, beyond its band, a rover swings that starts with its heading wrong."""
     if vehicle.pursuit is not None:
         return pursuit.start_swing_m(vehicle, vehicle.pursuit, error_deg)
-    return _start(vehicle, error_deg, _START_SWINGS, _SKID_START_SWINGS)
+    steered = _EARLY_START_SWINGS if is_early(vehicle) else _START_SWINGS
+    return _start(vehicle, error_deg, steered, _SKID_START_SWINGS)
 
 
 def start_behind_m(vehicle: Vehicle, error_deg: float) -> float:

@@ -180,7 +180,8 @@ def test_rtl_said_again_within_four_seconds_is_the_same_press(after_s, is_heard)
 
 
 def test_a_transmitters_second_rtl_comes_through_another_mode():
-    run = heading_home(on_the_way(conductor()))
+    # So far out that the RTL below does not end at home.
+    run = heading_home(on_the_way(conductor(), seconds=20.0))
     wait(run, 5)
     unheard(run, m.SetMode(1, 1, MANUAL))
     run.run_until(lambda: run.director.state is State.LET_GO, 3)

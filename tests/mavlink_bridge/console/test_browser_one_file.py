@@ -97,11 +97,16 @@ COLOURS = {
 
 
 def pixels(seen: Still) -> dict[str, int]:
-    """Return how many pixels of the map have the colour of what is to be seen there."""
-    seen.page.wait_for_timeout(300)  # the last labels
-    picture = Image.open(BytesIO(seen.page.locator(".map").screenshot())).convert("RGB")
-    counts = {f"{r:02x}{g:02x}{b:02x}": count for count, (r, g, b) in picture.getcolors(1 << 24)}
-    return {name: counts.get(colour, 0) for name, colour in COLOURS[seen.scheme].items()}
+    """Return how many pixels of the map have the colour of what is to be seen there, once it is drawn: on a busy computer that takes its time."""
+    counted: list[dict[str, int]] = []
+    while len(counted) < 60 and not (
+        len(counted) > 1 and counted[-1] == counted[-2] and any(counted[-1].values())
+    ):
+        seen.page.wait_for_timeout(300)  # the last labels
+        picture = Image.open(BytesIO(seen.page.locator(".map").screenshot())).convert("RGB")
+        counts = {f"{r:02x}{g:02x}{b:02x}": count for count, (r, g, b) in picture.getcolors(1 << 24)}
+        counted.append({name: counts.get(colour, 0) for name, colour in COLOURS[seen.scheme].items()})
+    return counted[-1]
 
 
 def test_a_plan(opened):

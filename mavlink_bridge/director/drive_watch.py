@@ -10,7 +10,7 @@ import numpy as np
 from shapely import LineString, Point, prepare
 
 from mavlink_bridge.director.events import EventName
-from mavlink_bridge.director.incidents import SAME_S
+from mavlink_bridge.director.incidents import BreachTexts
 from mavlink_bridge.director.voice import metres
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.autopilots import ARDUPILOT
@@ -73,7 +73,7 @@ class _BreachCount:
     def __init__(self, rules: IncidentRules) -> None:
         self._rules = rules
         self._before: int | None = None
-        self._text_s = -math.inf
+        self._texts = BreachTexts()
         self.count = 0
 
     def receive(self, message: m.Message, now_s: float) -> None:
@@ -82,9 +82,8 @@ class _BreachCount:
             if self._before is None:
                 self._before = message.breach_count
             self.count = max(self.count, message.breach_count - self._before)
-        elif isinstance(message, m.Statustext) and self._rules.tells_breach_alone(message.text):
-            self.count += int(now_s > self._text_s + SAME_S)
-            self._text_s = now_s
+        elif isinstance(message, m.Statustext):
+            self.count += self._texts.tells_new(message.text, self._rules, now_s)
 
 
 class DriveWatch:

@@ -43,7 +43,7 @@ from mavlink_bridge.director.battery_watch import BatteryWatch
 from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.fixes import fix_trouble, is_better
-from mavlink_bridge.director.incidents import SAME_S
+from mavlink_bridge.director.incidents import BreachTexts
 from mavlink_bridge.director.orders import TargetSource
 from mavlink_bridge.director.states import ON_VEHICLE, Notice, Signal, State
 from mavlink_bridge.director.targets import HomeCall, Target
@@ -126,7 +126,7 @@ class HomeCaller(Part):
         self._second_s = -math.inf  # when the second RTL was heard or seen last
         self._is_seen = True  # the mode told last was told a moment ago
         self._was_breached = False
-        self._breach_text_s = -math.inf
+        self._breach_texts = BreachTexts()
         self._bad_fixes = 0
         self._arrived_s: float | None = None  # since when it stands in HOLD after a drive of ours
         self._refused_fix: Fix | None = None
@@ -244,13 +244,8 @@ class HomeCaller(Part):
         was_breached, self._was_breached = self._was_breached, bool(status.breach_status)
         return self._take_breach(now_s) if self._was_breached and not was_breached else []
 
-    def _tells_breach(self, text: m.Statustext, now_s: float) -> bool:
-        """Return whether a text tells of a breach that nothing else tells of; the same text just after it tells of the same."""
-        if not self.core.autopilot.incidents.tells_breach_alone(text.text):
-            return False
-        is_new = now_s > self._breach_text_s + SAME_S
-        self._breach_text_s = now_s
-        return is_new
+    def _tells_breach(self, message: m.Statustext, now_s: float) -> bool:
+        return self._breach_texts.tells_new(message.text, self.core.autopilot.incidents, now_s)
 
     def _take_breach(self, now_s: float) -> Sequence[Signal]:
         if self.core.state not in (State.STARTING, State.DRIVING):

@@ -21,11 +21,12 @@ from missions.checking.fence_place import fence_place
 if TYPE_CHECKING:
     from mavlink_bridge.director.takeover import Takeover
     from mavlink_bridge.director.voice import Voice
+    from mavlink_bridge.mavlink.incident_rules import IncidentRules
     from missions.checking.fence_place import FencePlace
     from missions.request import Request
     from missions.situation import Known, Pose, Situation
 
-SAME_S = 2.0
+_SAME_S = 2.0
 """A text and a FENCE_STATUS, or two texts on one failsafe, that come so soon after another tell of the same."""
 
 _AT_MOST_EVERY_S = 1.0
@@ -43,6 +44,21 @@ _BREACH_TYPES = {1: "minimum altitude", 2: "maximum altitude", 3: "boundary"}
 
 _UNTOLD = "failsafe"
 """What a heartbeat shows where no text told of it."""
+
+
+class BreachTexts:
+    """Hears of breaches that nothing but a text tells of; what comes soon after tells of the same."""
+
+    def __init__(self) -> None:
+        self._heard_s = -math.inf
+
+    def tells_new(self, text: str, rules: IncidentRules, now_s: float) -> bool:
+        """Return whether a text tells of another breach."""
+        if not rules.tells_breach_alone(text):
+            return False
+        is_new = now_s > self._heard_s + _SAME_S
+        self._heard_s = now_s
+        return is_new
 
 
 class Incidents:
@@ -102,7 +118,7 @@ class Incidents:
         """Return whether the autopilot has just told that it does not drive the mission any more."""
         told = self.autopilot.incidents.shown_by_text
         return any(
-            cause.reason in told and now_s <= cause.heard_s + SAME_S for cause in self._causes.values()
+            cause.reason in told and now_s <= cause.heard_s + _SAME_S for cause in self._causes.values()
         )
 
     def heard_before(self, now_s: float) -> Cause | None:
@@ -146,7 +162,7 @@ class Incidents:
         new = status.breach_count - before
         if new <= 0:  # the count has started anew where it is less
             new = int(self._is_breached and not was_breached)
-        if new and now_s <= self._breach_text_s + SAME_S:  # its text has told of it
+        if new and now_s <= self._breach_text_s + _SAME_S:  # its text has told of it
             self._breach_text_s = -math.inf
             new -= 1
         if new and now_s < self._breach_told_s + _AT_MOST_EVERY_S:  # counted with the next status after that
@@ -161,7 +177,7 @@ class Incidents:
         return Cause(_BREACH, now_s, modes, needs_heartbeat=rules.shown_by_heartbeat)
 
     def _take_breach_text(self, situation: Situation, now_s: float) -> None:
-        if now_s > self._breach_told_s + SAME_S:
+        if now_s > self._breach_told_s + _SAME_S:
             self._tell_breach(1, None, situation, now_s)
             self._breach_text_s = now_s
 
@@ -215,7 +231,7 @@ class Incidents:
             modes = frozenset()  # the vehicle's own word for it says nothing, so nothing is claimed
         needs_heartbeat = rules.shown_by_heartbeat and reason not in rules.shown_by_text
         mode = self._note(Cause(reason, now_s, modes, needs_heartbeat=needs_heartbeat))
-        is_told = now_s <= self._told_s.get(reason, -math.inf) + SAME_S
+        is_told = now_s <= self._told_s.get(reason, -math.inf) + _SAME_S
         self._told_s[reason] = now_s
         if is_told and mode is None:
             return

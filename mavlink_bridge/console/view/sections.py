@@ -593,18 +593,8 @@ class AfterSample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AfterPiece:
-    """What was driven of one plan, against what it promised.
-
-    Parameters
-    ----------
-    is_kept : bool
-        Whether no breach was counted and no position was nearer to the fence than was promised.
-    has_arrived : bool
-        Whether it went to its end; else it was stopped.
-    predicted_s, length_m : float or None
-        Of the whole plan, also where it was stopped.
-    """
+class AfterFigures:
+    """What a drive, or a piece of it, came to, against what was promised."""
 
     plan_id: str
     promised_m: float | None
@@ -619,11 +609,27 @@ class AfterPiece:
     deviation_max_m: float
     outside_max_m: float
     breaches: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AfterPiece(AfterFigures):
+    """What was driven of one plan, against what it promised.
+
+    Parameters
+    ----------
+    is_kept : bool
+        Whether no breach was counted and no position was nearer to the fence than was promised.
+    has_arrived : bool
+        Whether it went to its end; else it was stopped.
+    predicted_s, length_m : float or None
+        Of the whole plan, also where it was stopped.
+    """
+
     profile: tuple[AfterSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AfterView:
+class AfterView(AfterFigures):
     """What was driven against what was promised, of the newest drive: from its first start to its end, or so far.
 
     Parameters
@@ -640,19 +646,6 @@ class AfterView:
         One for each plan that was driven: after each HOLD with "Go on" there is one more.
     """
 
-    plan_id: str
-    promised_m: float | None
-    is_kept: bool
-    has_arrived: bool
-    least_m: float | None
-    least_at: Place | None
-    predicted_s: float | None
-    took_s: float
-    driven_m: float
-    length_m: float
-    deviation_max_m: float
-    outside_max_m: float
-    breaches: int
     pieces: tuple[AfterPiece, ...] = ()
 
 

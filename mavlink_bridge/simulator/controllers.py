@@ -232,24 +232,19 @@ class Position:
             _COMPASS_RAD * abs(velocity_mps)
         ):
             facing *= cmath.rect(1.0, _COMPASS_RAD)
-        wanted = (limits.velocity_p * error_mps + accel_mps2) * facing.conjugate()
         ahead = velocity_mps * facing.conjugate()
+        if (
+            not self.target_velocity_mps
+        ):  # the target point stands: what is left is driven straight, however slowly (since 4.5)
+            return 0.0, self._attitude.limited_speed(ahead.real, dt_s)
+        wanted = (limits.velocity_p * error_mps + accel_mps2) * facing.conjugate()
         turn_speed_mps = math.sqrt(limits.lateral_accel_mps2 * 0.5 * self._turn_radius())
         least_mps = min(abs(velocity_mps), turn_speed_mps)
         # Backing away is always backwards, as if the fence lay ahead.
         speed_mps = min(-least_mps, ahead.real) if is_backing else max(least_mps, ahead.real)
-        if self._is_stopping:
-            speed_mps = ahead.real
         speed_mps = self._attitude.limited_speed(speed_mps, dt_s)
-        if self._is_stopping:
-            return 0.0, speed_mps
         divisor = -max(-speed_mps, 1.0) if speed_mps < 0 else max(speed_mps, 1.0)
         return wanted.imag / divisor, speed_mps
-
-    @property
-    def _is_stopping(self) -> bool:
-        """Whether the target point stands: what is left is driven straight ahead or back, however slowly (since 4.5)."""
-        return not self.target_velocity_mps
 
     def _turn_radius(self) -> float:
         return 0.0 if self.settings.is_skid else self.settings.turn_radius_m

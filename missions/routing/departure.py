@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from shapely import Point
 
 from missions.drive_model import envelope
-from missions.drive_model.corner import band_m
+from missions.drive_model.corner import START_BEHIND_M, band_m
 from missions.fitting.polyline import shifted
 from missions.geo import heading_vector
 from missions.ground.start_hazard import LEAVES_FROM_M
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 # Chosen, not measured: a first leg every 15° from the heading on, and its lengths.
 WAYS = 24
 LENGTHS_M = (16.0, 8.0, 4.0)
-ROOM_M = 11.0
-"""With so much more room than it has to keep a vehicle can turn any way: it comes at most 10 m behind its start (`missions.drive_model.corner`)."""
+ROOM_M = START_BEHIND_M[-1][1] + 1.0
+"""With so much more room than it has to keep a vehicle can turn any way: the farthest that it comes behind its start, and its band."""
 
 
 _MEASURED_START_MPS = 2.0

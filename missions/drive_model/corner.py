@@ -245,7 +245,8 @@ def behind_share(turn_deg: float) -> float:
 
 def swing_hold_s(vehicle: Vehicle, swing_m: float, *, stopped: bool, pivots: bool) -> float:
     """Return how long after the middle of its blend a rover goes on swinging out; it swings out little where it does so briefly."""
-    if pivots or not (stopped or vehicle.autopilot is Autopilot.ARDUPILOT):
+    follows_blend = vehicle.autopilot is Autopilot.ARDUPILOT and not is_early(vehicle)
+    if pivots or not (stopped or follows_blend):
         return 0.0
     return (START_HOLD_S if stopped else SWING_HOLD_S) * min(swing_m / _swing_radius_m(vehicle), 1.0)
 

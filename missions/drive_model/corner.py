@@ -42,7 +42,10 @@ SWING_PER_TURN_RADIUS = 2.45
 
 TURN_BACK_DEG = (168.0, 180.0)
 TURN_BACK_SWING = 1.28
-"""Between these turns it swings out farther, by up to so many turning radii: 3.6 m in all after 180° at 1 m/s, the only speed measured there."""
+"""Between these turns it swings out farther, by up to so many turning radii: 3.6 m in all after 180° at 1 m/s; from 2 m/s on less (tests/missions/drive_model/data/turns_back.csv)."""
+
+TURN_BACK_BEHIND = 0.6
+"""At 180° it comes so much of that behind its waypoint, 2.08 m at 1 m/s; a quarter up to 168° (tests/missions/drive_model/data/turns_back.csv)."""
 
 SLOW_MPS = 1.0
 SLOW_SKID_SWING_M, SLOW_SKID_TURN_DEG = 0.3, 45.0
@@ -110,7 +113,10 @@ MEASURED_TURN_RADIUS_M = 0.9
 """Swings of steered wheels grow with the turning radius beyond this; below it they are taken as measured. TURN_RADIUS does nothing on skid steer (AR_WPNav::set_turn_params)."""
 
 START_HOLD_S = 1.5
-"""A swing at the start begins to die away only then."""
+"""A swing at the start, or after a stop, begins to die away only then."""
+
+SWING_HOLD_S = 1.0
+"""So long after the middle of its blend does a swing at a corner begin to die away (tests/missions/drive_model/data/turns_back.csv)."""
 
 END_OVERRUN_M, EARLY_END_OVERRUN_M = 0.8, 1.2
 """Past the last waypoint, the farthest measured, and with firmware before 4.6 (docs/drive-model.md, 3)."""
@@ -128,6 +134,9 @@ before 4.6): with a corner there its corridor is so much wider, and reaches so m
 BACK_SWING_M = 2.5
 EARLY_UNSETTLED_M = ((0.8, 3.9), (1.2, 1.9), (1.5, 1.3), (2.0, 0.9), (8.0, 0.9), (10.0, 0.0))
 """The same for firmware before 4.6 where it faces back (it swings out so far), by the length of the run; from the same rows, with 0.2 m more."""
+
+EARLY_STOP_RUN_M = 25.0
+"""Stops for a delay were measured before 4.6 on legs of 25 m and more (tests/missions/drive_model/data/turns_back.csv)."""
 
 PIVOT_DOUBT_DEG = 2.0
 """Corners this near to the pivot angle may be cut or pivoted: rounding of coordinates decides."""
@@ -229,6 +238,19 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
     return max(float(swing_m), slow_m)
 
 
+def behind_share(turn_deg: float) -> float:
+    """Return how far behind its waypoint a rover comes, as a share of what it swings out."""
+    return _interpolated(abs(turn_deg), TURN_BACK_DEG, (0.25, TURN_BACK_BEHIND))
+
+
+def swing_hold_s(vehicle: Vehicle, swing_m: float, *, stopped: bool, pivots: bool) -> float:
+    """Return how long after the middle of its blend a rover goes on swinging out; it swings out little where it does so briefly."""
+    follows_blend = vehicle.autopilot is Autopilot.ARDUPILOT and not is_early(vehicle)
+    if pivots or not (stopped or follows_blend):
+        return 0.0
+    return (START_HOLD_S if stopped else SWING_HOLD_S) * min(swing_m / _swing_radius_m(vehicle), 1.0)
+
+
 def swing_length_m(vehicle: Vehicle) -> float:
     """Return how far along its next leg a rover comes before a swing is at its widest."""
     if vehicle.pursuit is not None:
@@ -280,8 +302,9 @@ def is_bounded(vehicle: Vehicle, turn_deg: float, shorter_leg_m: float, *, stops
         is_steered = vehicle.steering is Steering.ACKERMANN
         if pivots(vehicle, turn_deg):
             return True
-        run_m = 0.0 if stops and is_steered else shorter_leg_m  # stops were not measured before 4.6
-        return before_4_6.is_bounded(turn_deg, run_m, is_steered=is_steered)
+        if stops and is_steered:
+            return shorter_leg_m >= EARLY_STOP_RUN_M
+        return before_4_6.is_bounded(turn_deg, shorter_leg_m, is_steered=is_steered)
     sharp = abs(turn_deg) > UNBOUNDED_TURN_DEG and shorter_leg_m < UNBOUNDED_LEG_M
     return vehicle.steering is Steering.SKID or not sharp
 

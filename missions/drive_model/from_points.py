@@ -70,7 +70,7 @@ def drive_plan(
     middle_s = at_corner.START_HOLD_S
     for leg, corner in zip(legs, corners, strict=False):
         passed_s = leg.profile.duration_s - middle_s - corner.blend.duration_s / 2
-        middle_s = corner.blend.duration_s / 2
+        middle_s = corner.swings_until_s
         left = strays[-1].after(passed_s, vehicle.position_gain_per_s)
         # PX4's rover that comes to a waypoint facing the wrong way was as far off on the leg after it: no turn takes anything away.
         kept = (
@@ -161,15 +161,16 @@ def _corner(
     else:
         blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
         swing_m = at_corner.corner_swing_m(vehicle, bend, blend.reach_m)
-        behind_m = swing_m / 4
+        behind_m = swing_m * at_corner.behind_share(turn_deg)
         if vehicle.pursuit is not None and abs(turn_deg) > at_pursuit.EITHER_SIDE_DEG:
             either_m = swing_m
         if at_corner.is_early(vehicle):
             swing = at_corner.early_swing(vehicle, bend)
             swing_m = swing.outside_m
-            behind_m = swing_m / 2
+            behind_m = swing_m * (0.25 + at_corner.behind_share(turn_deg))
             tail = Stray(swing.later_outside_m, swing.later_inside_m).seen_from(turn_deg)
     more = corner_more(vehicle, turn_deg, bend.speed_mps, stands=stopped or pivots)
+    holds_s = at_corner.swing_hold_s(vehicle, swing_m, stopped=stopped, pivots=pivots)
     swing_m = max(0.0, swing_m + min(more.outside_m, 0.0))
     top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
     ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
@@ -192,6 +193,7 @@ def _corner(
         blend=blend,
         swing_m=swing_m,
         behind_m=behind_m,
+        swings_until_s=blend.duration_s / 2 + holds_s,
         stray_m=max(_stray_m(len(group), delay_s), either_m),
         tail=tail,
         time_lost_s=lost_s,

@@ -54,6 +54,8 @@ class CornerPlan(NamedTuple):
         The overlap of the two legs' motions.
     swing_m, behind_m : float
         How far beyond its band it gets off the next leg to the outside, and behind the waypoint.
+    swings_until_s : float
+        When that begins to die away, since the next leg's own start.
     stray_m : float
         How far beyond its band it may be to either side.
     tail : Stray
@@ -74,6 +76,7 @@ class CornerPlan(NamedTuple):
     blend: Blend
     swing_m: float
     behind_m: float
+    swings_until_s: float
     stray_m: float
     tail: Stray
     time_lost_s: float
@@ -104,7 +107,7 @@ class DrivePlan:
 
     def stray_at(self, leg: int, time_s: float) -> Stray:
         """Return what is left of earlier swings at a time since the leg's own start."""
-        middle_s = self.corners[leg - 1].blend.duration_s / 2 if leg else at_corner.START_HOLD_S
+        middle_s = self.corners[leg - 1].swings_until_s if leg else at_corner.START_HOLD_S
         stray = self.strays[leg].after(time_s - middle_s, self.vehicle.position_gain_per_s)
         if not self.tails:
             return stray

@@ -430,8 +430,8 @@ def test_an_unknown_heading_is_the_worst_but_exactly_back(
     east_m, north_m = points[1] - points[0]
     heading_deg = math.degrees(math.atan2(east_m, north_m)) + off_deg
     unknown, known = envelope(points, vehicle), envelope(points, vehicle, heading_deg=heading_deg)
-    # To a tenth of a millimetre: two unions of many rounded pieces differ by up to 0.03 mm.
-    assert unknown.area.buffer(1e-4).covers(known.area)
+    # To half a millimetre: two unions of many rounded pieces differ by up to 0.11 mm.
+    assert unknown.area.buffer(5e-4).covers(known.area)
     assert unknown.duration_s >= known.duration_s - 1e-9
 
 

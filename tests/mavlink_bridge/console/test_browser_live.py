@@ -103,7 +103,7 @@ def move_a_way_point(seen: Watched) -> None:
     seen.page.get_by_role("button", name="Waypoint 1.").focus()
     for _ in range(6):
         seen.page.keyboard.press("Shift+ArrowRight")
-    expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? breaks? the promise"))
+    expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? do(es)? not keep the clearance"))
 
 
 def back_to_planning(seen: Watched) -> None:
@@ -167,7 +167,7 @@ STEPS = [
         type_a_clearance,
     ),
     (
-        "Drag a waypoint across the fence, or move it there with the arrow keys. The headline says at once how many legs break the promise.",
+        "Drag a waypoint across the fence, or move it there with the arrow keys. The headline says at once how many legs do not keep the clearance.",
         move_a_way_point,
     ),
     ("Press **Back to planning**.", back_to_planning),
@@ -308,7 +308,7 @@ def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
         seen = open_page(browser, server.url, expected=r"net::ERR_|WebSocket connection")
         set_target(seen.page, "40.0723079, -105.2285800")
         server.stop()
-        expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost pbpp")
+        expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost its connection to pbpp")
         with serving("--fence", fence, "--start", "40.0712247,-105.2302031", port=port):
             expect(seen.page.locator(".alarm-bar")).to_be_hidden()
             # What was asked for is still there, and can be asked again.

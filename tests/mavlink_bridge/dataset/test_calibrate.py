@@ -226,7 +226,7 @@ def test_corners_slowed_by_what_the_log_does_not_tell_narrow_nothing(tmp_path, d
     found = calibrate(made_dataset(tmp_path / "dataset", logs, driven_mps=driven_mps), None)
     (one,) = found.calibration.corners
     assert (one.inside_more_m < 0) == narrows
-    assert ("driven slower or faster than predicted" in " ".join(found.remarks)) != narrows
+    assert ("whose speed is unknown or differs" in " ".join(found.remarks)) != narrows
 
 
 SQUARE = [(0.0, 0.0), (0.0, 30.0), (30.0, 30.0), (30.0, 0.0), (0.0, 0.0)]

@@ -149,9 +149,9 @@ def arrive(seen: Watched) -> None:
 
 # Each step of the tutorial with its words: whoever changes one changes the other.
 STEPS = [
-    ("Press **Take control**. Other pages can look now, and press HOLD.", take_control),
+    ("Press **Take control**. Other pages can now only watch, and press HOLD.", take_control),
     (
-        "Open **Fence**, press **Draw a circle**, and click its middle and its rim in the green. It is a place to keep out of.",
+        "Open **Fence**, press **Draw a circle**, and click its centre and its rim in the green area. The rover will keep out of it.",
         draw_a_circle,
     ),
     (
@@ -159,7 +159,7 @@ STEPS = [
         upload_the_fence,
     ),
     (
-        'Open **Plan** and click the map where the rover shall go, some way off. The route appears with what it promises: "2.50 m promised".',
+        'Open **Plan** and click the map where the rover should go, some way off. The route appears with the clearance that it promises: "2.50 m promised".',
         click_a_target,
     ),
     (
@@ -182,7 +182,7 @@ STEPS = [
         go_on,
     ),
     (
-        'Wait until the state is "arrived". Below stands what was driven against what was promised, before HOLD and after it.',
+        'Wait until the state is "arrived". The table below compares what was driven with what was promised, before HOLD and after it.',
         arrive,
     ),
 ]

@@ -50,12 +50,12 @@ def driving(console) -> SteppedConsole:
 def test_a_plan_that_was_looked_at_is_made_again_uploaded_started_and_driven(tmp_path):
     console = ready(tmp_path)
     looked = looked_at(console)
-    assert "same plan" in console.do(deeds.UploadPlan(looked.view.id, looked))
+    assert "planning again from where the rover is" in console.do(deeds.UploadPlan(looked.view.id, looked))
     console.until(lambda: console.director.state is State.VERIFIED)
     assert plan_id(console.director.plan) == looked.view.id
     console.wait(5.0)
     assert console.director.state is State.VERIFIED  # nothing drives before somebody starts it
-    with pytest.raises(Refusal, match="another plan"):
+    with pytest.raises(Refusal, match="not the one that you see"):
         console.do(deeds.Start("of yesterday"))
     console.do(deeds.Start(looked.view.id))
     console.until(console.run.happened(EventName.ARRIVED), 200)
@@ -131,7 +131,7 @@ def test_who_takes_control_ends_what_another_page_waits_for(tmp_path, state):
     gone_on(console)
     console.until(lambda: console.director.state is state)
     console.do(deeds.TakeControl(), "page 1")  # its own: nothing changes
-    assert not any("not done" in text for text, _ in console.told)
+    assert not any("is cancelled" in text for text, _ in console.told)
     console.do(deeds.TakeControl(), "page 2")
     what = "start" if state is not State.PLANNING else "drive on"
     assert console.told[-1] == (
@@ -168,7 +168,7 @@ def test_a_deed_of_the_next_page_ends_what_the_last_one_waits_for_and_so_does_gi
 def test_a_drive_that_has_begun_and_an_upload_under_way_go_on_under_other_hands(tmp_path):
     console = driving(ready(tmp_path))
     console.do(deeds.TakeControl(), "page 2")
-    assert not any("not done" in text for text, _ in console.told)
+    assert not any("is cancelled" in text for text, _ in console.told)
     console.until(console.run.happened(EventName.ARRIVED), 200)
     console.do(deeds.UploadPlan("x", looked_at(console, replace(FAR_TOUR, targets=(NEAR,)))), "page 2")
     console.until(lambda: console.director.state is State.UPLOADING)
@@ -253,7 +253,7 @@ def test_what_cannot_be_done_now_is_refused_and_says_why(tmp_path):
             console.do(deed)
     console = driving(console)
     for deed in (deeds.UploadFence(FENCE), deeds.Resume()):
-        with pytest.raises(Refusal, match="at work"):
+        with pytest.raises(Refusal, match="is busy"):
             console.do(deed)
 
 

@@ -55,7 +55,7 @@ def read_rows(path: Path) -> Iterator[Row]:
         place = os.path.normcase(os.path.normpath(path.parent / output))
         if output and outputs.setdefault(place, number) != number:
             raise UsageError(
-                f"{path}: row {number}: output {output!r} is that of row {outputs[place]} too: one plan would take the other's place"
+                f"{path}: row {number}: output {output!r} is that of row {outputs[place]} too: one plan would overwrite the other"
             )
         yield row
 
@@ -77,7 +77,7 @@ def _csv_rows(path: Path) -> Iterator[Row]:
                     f"{path} is empty; the first line names the columns: {', '.join(COLUMNS)}", file=str(path)
                 )
             if twice := sorted({name for name in names if names.count(name) > 1}):
-                raise UsageError(f"{path}: column {twice[0]!r} is there twice")
+                raise UsageError(f"{path}: column {twice[0]!r} appears twice")
             for row in reader:
                 if None in row:
                     raise MissionFormatError(
@@ -115,7 +115,7 @@ def _json_rows(path: Path) -> Iterator[Row]:
 def _object(pairs: list[tuple[str, Any]]) -> Row:
     row = dict(pairs)
     if len(row) < len(pairs):
-        raise ValueError("a key is there twice")
+        raise ValueError("a key appears twice")
     return row
 
 

@@ -59,11 +59,11 @@ if TYPE_CHECKING:
 
 # Between attempts to open a link anew: doubled up to half a minute. Chosen, not measured.
 _BACKOFF_S = (0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
-_OBSTACLES_TEXT = "reported obstacles are planned round; this protects no person: a sensor may see nothing, and the rover rolls on after HOLD"
+_OBSTACLES_TEXT = "routes are planned around reported obstacles; this protects no person: a sensor may miss one, and the rover rolls on after HOLD"
 _LINK_LOOK_S = 0.25  # how soon an interrupt is seen while waiting for that
 _BY_ROUTE = (
-    "--rtl-by-route: the first RTL is answered with HOLD and a verified way home round the fences in AUTO. RTL again 4 s or more later, or any other mode, "
-    "is yours at once: then RTL drives straight, through whatever lies between"
+    "--rtl-by-route: the first RTL is answered with HOLD and a verified way home around the fences in AUTO. RTL again 4 s or more later, or any other mode, "
+    "is left to you at once; that RTL drives straight, through any fence on the way"
 )
 _PAGES_LOOK_S = 0.05  # so soon what a page asks for is done; chosen: less than a person notices
 _OPENING_LOOK_S = 0.05  # and while a link is being opened
@@ -151,7 +151,9 @@ def _homing(options: BridgeOptions) -> Homing:
     if options.rtl_by_route and not options.drive:
         raise UsageError("--rtl-by-route needs --upload --drive: it switches the vehicle to HOLD and AUTO")
     if options.rtl_by_route and options.once:
-        raise UsageError("--rtl-by-route does not go with --once: a bridge that has ended brings nobody home")
+        raise UsageError(
+            "--rtl-by-route does not go with --once: a bridge that has ended cannot bring the vehicle home"
+        )
     for name, value in (
         ("--battery-percent", options.battery_percent),
         ("--battery-volts", options.battery_volts),

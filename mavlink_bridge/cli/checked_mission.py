@@ -75,7 +75,7 @@ def items_text(checked: MissionCheck) -> str:
 def _storage_warnings(checked: MissionCheck, situation: Situation) -> list[str]:
     """Warn of a mission that the vehicle cannot hold."""
     home, most = checked.vehicle.home_items, most_own_items(situation)
-    by_board = "" if home else " (or 1000, by its board: no parameter says which)"
+    by_board = "" if home else " (or 1000, depending on the board; no parameter tells which)"
     told = f"{items_text(checked)}; the vehicle holds {most + home}{by_board}"
     return [told] if len(checked.mission.items) > most else []
 

@@ -113,7 +113,9 @@ _ADVICE: Mapping[type[Exception], tuple[str, ...]] = {
         "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     ),
     bridge_errors.ClusterError: (),
-    bridge_errors.LostWorkerError: ("give the machine more memory, or leave out what the worker died at",),
+    bridge_errors.LostWorkerError: (
+        "give the machine more memory, or leave out the file or row at which the worker died",
+    ),
     bridge_errors.RefusedError: ("see the vehicle's own messages in the ground station",),
     bridge_errors.VehicleInUseError: ("wait for the other pbpp to finish, or stop it",),
     bridge_errors.OutcomeError: ("check what the vehicle holds (`pbpp download`) before it drives",),
@@ -231,7 +233,9 @@ def report_full_stdout(command: str, error: Exception) -> ExitCode | None:
         return None
     drop_stdout()
     message = f"standard output cannot be written: {error.strerror}"
-    report(command, "FileError", message, ExitCode.INPUT, {"advice": "make room there"}, wants_json=False)
+    report(
+        command, "FileError", message, ExitCode.INPUT, {"advice": "free some space there"}, wants_json=False
+    )
     return ExitCode.INPUT
 
 

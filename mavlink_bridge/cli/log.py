@@ -133,7 +133,7 @@ def _print(book: Logbook, *, messages: bool) -> None:
         show(f"Damage skipped: {book.damage}")
     if book.clock_jumps:
         show(
-            f"The log's clock was set {counted(book.clock_jumps, 'time')} while it was written: rates are off"
+            f"The log's clock was set {counted(book.clock_jumps, 'time')} while it was written: rates are not accurate"
         )
     if book.clock_trouble:
         show(f"{book.clock_trouble}: times, rates and speeds below cannot be trusted")

@@ -36,7 +36,7 @@ def situation_of(log: Path, options: LinkOptions, *, drives_its_items: bool) -> 
     )
     if drives_its_items and situation.ardupilot is False:
         raise LogError(
-            f"{log}: the autopilot of system {situation.system} is not ArduPilot: its own mission is not taken from a log; give it as a file (--mission)",
+            f"{log}: the autopilot of system {situation.system} is not ArduPilot: its mission in a log is not used; give it as a file (--mission)",
             file=str(log),
         )
     return situation

@@ -99,7 +99,7 @@ def plan_task(task: Task[AskedPlan]) -> Planned:
     places = dict(zip(asked.files, task.files, strict=True))
     options = options_of(asked.row, asked.options, asked.folder)
     if options.fence is None:
-        raise UsageError("no fence: give the row one, or all rows --fence FILE")
+        raise UsageError("no fence: give one in the row, or --fence FILE for all rows")
     here = replace(
         options,
         fence=places[options.fence],

@@ -111,7 +111,7 @@ def choice_warnings(choice: RallyChoice, checked: MissionCheck, situation: Situa
         )
     if vehicle.oa_type:
         warnings.append(
-            f"OA_TYPE {vehicle.oa_type}: RTL plans its own way round what it knows, and is not straight; the lines hold with OA_TYPE 0"
+            f"OA_TYPE {vehicle.oa_type}: RTL plans its own way and does not drive straight; the result is valid only with OA_TYPE 0"
         )
     rtl_mps = situation.parameters.get("RTL_SPEED", 0.0)
     if rtl_mps > vehicle.speed_mps:
@@ -179,7 +179,7 @@ def _kept(choice: RallyChoice) -> str:
 def _report(choice: RallyChoice, outputs: list[Path], *, verified: bool) -> None:
     home = ", home among them" if choice.has_home else ""
     echo(f"{counted(len(choice.points), 'rally point')}{home}: {'; '.join(map(str, choice.points))}")
-    echo(f"{_kept(choice)}; so do those from {100 * choice.field_share:.0f} % of the free ground")
+    echo(f"{_kept(choice)}; so do those from {100 * choice.field_share:.0f} % of the allowed area")
     for path in outputs:
         if str(path) != "-":
             echo(f"Wrote {path}")
@@ -188,7 +188,7 @@ def _report(choice: RallyChoice, outputs: list[Path], *, verified: bool) -> None
         echo(f"Uploaded and verified, with {pairs}")
     else:
         echo(
-            f"They hold only with {pairs}: set both, with --upload or by uploading the parameters (-o FILE.param)"
+            f"The rally points are valid only with {pairs}: set both, with --upload or by uploading the parameters (-o FILE.param)"
         )
     echo("If the companion computer fails, the vehicle drives there on its own only with:")
 

@@ -113,7 +113,7 @@ def _check_autopilot(backup: Backup, vehicle: VehicleMark) -> None:
     if held != now:
         raise OtherVehicleError(
             f"the backup {backup.path} was read from another autopilot (MAV_AUTOPILOT {held}, this is {now}), which stores lists "
-            "otherwise; nothing was written"
+            "in another form; nothing was written"
         )
 
 

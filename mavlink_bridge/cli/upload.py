@@ -202,7 +202,7 @@ def _report(
         how = "already on the vehicle" if entry.outcome.pushes == 0 else f"uploaded in {entry.took_s:.1f} s"
         coarse = " (positions read back to about 1 m only)" if entry.outcome.is_coarse else ""
         name = entry.mission_type.name.lower()
-        counts = "" if entry.not_enforced is None or entry.not_enforced else ", counts by now"
+        counts = "" if entry.not_enforced is None or entry.not_enforced else ", in force now"
         echo(f"{name}: {len(entry.outcome.found or ())} items, {how}, read back and verified{coarse}{counts}")
         if entry.backup:
             echo(f"  the list before is kept in {entry.backup}")

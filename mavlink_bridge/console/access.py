@@ -108,7 +108,7 @@ class Access:
         if not self._is_ours(authority):
             return Problem(
                 kind="forbidden",
-                message="this server is not called by that name",
+                message="this server does not have that name",
                 advice="open the address that pbpp serve printed",
             )
         origin = headers.get("origin")

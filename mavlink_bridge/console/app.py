@@ -159,7 +159,7 @@ def _guarded(handler: Handler) -> Handler:
         except Refusal as refusal:
             return failure(refusal.problem, refusal.status)
         except (SupersededError, PlanStoppedError):
-            return failure(Problem(kind="superseded", message="a newer request took its place"), 409)
+            return failure(Problem(kind="superseded", message="replaced by a newer request"), 409)
         except (MissionError, BridgeError) as error:
             return failure(problem_of(error), 422)
         except msgspec.ValidationError as error:
@@ -280,7 +280,9 @@ class ConsoleRoutes:
         access = self._hub.access
         if access.needs_token and not access.takes_token(body.token):
             await asyncio.sleep(0.5)  # guessing is no use at 128 bits, and slow besides
-            return failure(Problem(kind="unauthorized", message="that token is not this server's"), 401)
+            return failure(
+                Problem(kind="unauthorized", message="the token is not valid for this server"), 401
+            )
         done = answer(TakenUp())
         if access.needs_token:
             done.headers["set-cookie"] = access.set_cookie()
@@ -329,7 +331,7 @@ class ConsoleRoutes:
             ) from None
         found = self._hub.backend.at(time_s)
         if found is None:
-            raise Refusal(Problem(kind="not_here", message="this is no replay"), 404)
+            raise Refusal(Problem(kind="not_here", message="this is not a replay"), 404)
         return answer({**self._hub.board.sections, **found})
 
     # Looking: nothing changes
@@ -436,9 +438,7 @@ class ConsoleRoutes:
     def _with_plan(self, situation: Situation, plan_id: str) -> Situation:
         looked = self._hub.looked.get(plan_id)
         if looked is None or not looked.items:
-            raise Refusal(
-                Problem(kind="not_found", message="that plan is not known any more: plan again"), 404
-            )
+            raise Refusal(Problem(kind="not_found", message="that plan no longer exists: plan again"), 404)
         home = looked.plan.home if looked.plan is not None else None
         start = looked.plan.start if looked.plan is not None else None
         return replace(situation, mission=Known(Mission(looked.items, home or start), None, "page"))
@@ -522,7 +522,7 @@ class ConsoleRoutes:
         """
         run_id, asked_s = request.headers.get("x-run-id"), request.headers.get("x-asked-s")
         if run_id is not None and run_id != self._hub.board.sections["server"].run_id:
-            raise Refusal(Problem(kind="late", message="pbpp was started anew since: nothing was sent"), 409)
+            raise Refusal(Problem(kind="late", message="pbpp was restarted meanwhile: nothing was sent"), 409)
         if asked_s is None:
             return
         try:

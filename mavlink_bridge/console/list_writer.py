@@ -202,7 +202,7 @@ class ListWriter:
             self._note.settle(Held.OLD)
         self._end(
             TransferView(
-                what=self._name, state="failed", text=f"the {self._name} upload was left: the link is gone"
+                what=self._name, state="failed", text=f"the {self._name} upload was stopped: the link is lost"
             )
         )
 

@@ -91,7 +91,7 @@ class LiveBackend:
             return await asyncio.wait_for(asked.answer, _ANSWER_S)
         except TimeoutError:
             raise not_now(
-                "the bridge does not answer: whether it was done is not known",
+                "the bridge does not answer: it is not known whether that was done",
                 "use the transmitter, or the e-stop",
             ) from None
 
@@ -104,7 +104,9 @@ class LiveBackend:
             if self.desk is None or (asked.answer.cancelled() and not only_stops):
                 continue
             if not only_stops and holds and index < holds[-1]:
-                _tell(asked, asked.answer.set_exception, not_now("HOLD came after it: nothing was sent"))
+                _tell(
+                    asked, asked.answer.set_exception, not_now("HOLD was pressed after it: nothing was sent")
+                )
                 continue
             try:
                 text = self.desk.do(asked.deed, asked.page, now_s)
@@ -124,7 +126,7 @@ class LiveBackend:
         return after_view(self.log.so_far())
 
     def at(self, time_s: float) -> dict[str, Any] | None:  # noqa: ARG002 - as the others
-        """Return None: this is no replay."""
+        """Return None: this is not a replay."""
         return None
 
 
@@ -316,7 +318,7 @@ class LiveConsole:
                 what="mission", state="verified", done=count, count=count, text=text, time_s=now_s
             )
         trouble = self._director.trouble
-        text = str(trouble) if trouble is not None else "the upload did not end well"
+        text = str(trouble) if trouble is not None else "the upload failed"
         return TransferView(what="mission", state="failed", text=text, time_s=now_s)
 
     def _follow(self) -> None:

@@ -183,14 +183,14 @@ class LiveDesk:
         """Do nothing any more that pages wait for which have control no more. An upload or a drive that has begun goes on."""
         if self._wanted is not None and is_meant(self._wanted.page):
             what = "drive on" if self._wanted.drives else "upload"
-            self._tell(f"{why}: the {what} that {self._wanted.page} waited for is not done", "warning")
+            self._tell(f"{why}: the {what} that {self._wanted.page} waited for is cancelled", "warning")
             self._wanted = None
         if self._list is not None and is_meant(self._list.page):
-            self._tell(f"{why}: the upload that {self._list.page} waited for is not done", "warning")
+            self._tell(f"{why}: the upload that {self._list.page} waited for is cancelled", "warning")
             self._list = None
         if self._word_of and is_meant(self._word_of):
             if self._director.awaits_start:
-                self._tell(f"{why}: the start that {self._word_of} waited for is not done", "warning")
+                self._tell(f"{why}: the start that {self._word_of} waited for is cancelled", "warning")
             self._journal("withhold", now_s)
             self._director.withhold_drive(now_s)
             self._word_of = ""
@@ -225,7 +225,7 @@ class LiveDesk:
             raise not_now(f"nothing to start: {director.state.replace('_', ' ')}", "upload a plan first")
         if plan_id(director.plan) != deed.plan_id:
             raise not_now(
-                "another plan is on the vehicle than the one that you see", "look at it, and start again"
+                "the plan on the vehicle is not the one that you see", "look at it, and start again"
             )
         self._check_free()
         self._tell(f"{page} starts the drive", "notice")
@@ -240,16 +240,18 @@ class LiveDesk:
     def _resume(self, _deed: deeds.Resume, page: str, now_s: float) -> str:
         request = self._driven
         if request is None:
-            raise not_now("there is no target to go on to", "choose a target, upload its plan and start it")
+            raise not_now(
+                "there is no target to continue to", "choose a target, upload its plan and start it"
+            )
         if request != self._director.orders.request:
             raise not_now(
-                "another target was asked for since the drive", "look at its plan, upload and start it"
+                "another target was requested since the drive", "look at its plan, upload and start it"
             )
         if self._director.state in AT_WORK:
-            raise not_now(f"the bridge is at work: {self._director.state}")
+            raise not_now(f"the bridge is busy: {self._director.state}")
         self._check_free()
         self._wanted = _Wanted(None, now_s + _GO_ON_S, page)
-        self._tell(f"{page} goes on to the last target", "notice")
+        self._tell(f"{page} continues to the last target", "notice")
         self._request(request, now_s)  # type: ignore[arg-type] # a Tour: it has targets
         return "planning the way from here"
 
@@ -274,13 +276,13 @@ class LiveDesk:
         looked = deed.looked
         if looked is None or looked.plan is None:
             raise Refusal(
-                Problem(kind="not_found", message="that plan is not known any more", advice="plan again"), 404
+                Problem(kind="not_found", message="that plan no longer exists", advice="plan again"), 404
             )
         if looked.request is None:
             return self._upload_mission(looked, page, now_s)
         self._wanted = _Wanted(looked.plan, None, page)
         self._request(looked.request, now_s)
-        return "the same plan is made from where the rover is now, and uploaded"
+        return "planning again from where the rover is now, then uploading"
 
     def _upload_mission(self, looked: Looked, page: str, now_s: float) -> str:
         """Write a mission that was checked or repaired: a file's, or waypoints of the page."""
@@ -311,7 +313,7 @@ class LiveDesk:
             raise Refusal(Problem(kind="not_found", message=str(error)), 404) from None
         if vehicle is None or vehicle.kinship(backup.vehicle) is not Kinship.SAME:
             raise not_now(
-                f"that backup is of {backup.vehicle}, which cannot be shown to be this vehicle",
+                f"that backup is of {backup.vehicle}, which may not be this vehicle",
                 f"on the command line: pbpp upload --restore {backup.path} --other-vehicle",
             )
         return self._queue(backup.mission_type, backup.items, page, now_s, backup.path)
@@ -329,7 +331,7 @@ class LiveDesk:
         if self._vehicle() is None or director.state in (State.LISTENING, State.LEARNING, State.LOST):
             raise not_now("the vehicle is not known yet")
         if director.state in AT_WORK or director.state is State.PLANNING:
-            raise not_now(f"the bridge is at work: {director.state}", "HOLD first, or wait")
+            raise not_now(f"the bridge is busy: {director.state}", "HOLD first, or wait")
         self._list = _List(kind, items, now_s + _LIST_PATIENCE_S, page, restored)
         self._go_on_with_list(now_s)
         return f"uploading the {kind.name.lower()}"
@@ -367,7 +369,8 @@ class LiveDesk:
         if wanted.until_s is not None and now_s > wanted.until_s:
             self._wanted = None
             self._tell(
-                "planning took too long to go on unseen: look at the plan, upload and start it", "warning"
+                "planning took too long to continue without asking: look at the plan, upload and start it",
+                "warning",
             )
             return
         if not director.awaits_confirmation:
@@ -379,7 +382,7 @@ class LiveDesk:
         assert plan is not None
         if wanted.like is not None and not is_same_route(wanted.like, plan):
             self._tell(
-                "the plan is another one by now (the vehicle or its fence has moved): nothing was uploaded; look at it, and upload it",
+                "the plan has changed (the vehicle or its fence has moved): nothing was uploaded; look at it, and upload it",
                 "warning",
             )
             return
@@ -392,11 +395,11 @@ class LiveDesk:
 
     def _blocked(self, deed: deeds.Blocked, page: str, now_s: float) -> str:
         if deed.position is None and self._director.situation.pose is None:
-            raise not_now("where the vehicle is is not known")
+            raise not_now("the vehicle's position is unknown")
         self._tell(f"{page} reports an obstacle; this protects no person", "notice")
         self._journal("obstacle", now_s, deed.position, str(deed.radius_m))
         self._director.take_obstacle(deed.position, deed.radius_m, now_s)
-        return "planning round it"
+        return "planning around it"
 
     def _clear_blocked(self, _deed: deeds.ClearBlocked, _page: str, now_s: float) -> str:
         self._journal("clear", now_s)

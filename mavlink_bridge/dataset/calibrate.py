@@ -109,7 +109,7 @@ def calibrate(dataset: Dataset, system: int | None) -> Calibrated:
         (drives,) = database.execute(_DRIVES, [system]).fetchone()
         if not drives:
             raise DatasetError(
-                f"vehicle {system} has no drive in this dataset that the drive model predicts: there is nothing to calibrate by",
+                f"vehicle {system} has no drive in this dataset that the drive model predicts: there is nothing to calibrate from",
                 system=system,
                 advice="record AUTO missions of plain waypoints, with mission and parameters in the log",
             )
@@ -275,19 +275,19 @@ def _remarks(
     remarks = []
     if few:
         remarks.append(
-            f"{few} of {len(calibration.corners)} classes of corners have fewer than {LEAST_CORNERS} corners: they may widen the corridor, and do not narrow it"
+            f"{few} of {len(calibration.corners)} classes of corners have fewer than {LEAST_CORNERS} corners: they may widen the corridor, but do not narrow it"
         )
     if others := int((~is_tuned_so).sum()):
         remarks.append(
-            f"{counted(others, 'corner')} driven with other parameters or firmware than the newest log's, or it is not known with which: that may widen the corridor, and narrows nothing"
+            f"{counted(others, 'corner')} driven with parameters or firmware that are unknown or not the newest log's: they may widen the corridor, but do not narrow it"
         )
     if twice := int((~is_once).sum()):
         remarks.append(
-            f"{counted(twice, 'corner')} in logs without times of day, or at a time when another log of the same system id has drives (another recording, or another rover): that may widen the corridor, and narrows nothing"
+            f"{counted(twice, 'corner')} in logs without times of day, or at a time when another log of the same system id has drives (another recording, or another rover): they may widen the corridor, but do not narrow it"
         )
     if slowed := int((~is_at_speed).sum()):
         remarks.append(
-            f"{counted(slowed, 'corner')} between legs that were driven slower or faster than predicted, by more than {NEARLY:.0%}, or it is not known how fast: that may widen the corridor, and narrows nothing"
+            f"{counted(slowed, 'corner')} between legs whose speed is unknown or differs by more than {NEARLY:.0%} from the predicted one: they may widen the corridor, but do not narrow it"
         )
     return remarks
 

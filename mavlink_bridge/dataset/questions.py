@@ -86,7 +86,7 @@ ORDER BY kept, short_m DESC, begun_utc, log, drive""",
         ),
         Question(
             "corners",
-            "How deep were corners cut and how far did the rover swing out, by angle and speed, beside the drive model's bound?",
+            "How deep were corners cut and how far did the rover swing out, by angle and speed, compared with the drive model's bound?",
             f"""SELECT {_CLASSES}, count(*) AS corners,
     round(quantile_cont(inside_cut_m, 0.5), 2) AS cut_median_m, round(quantile_cont(inside_cut_m, 0.99), 2) AS cut_99_m,
     round(max(inside_cut_m), 2) AS cut_most_m, round(max(predicted_inside_cut_m), 2) AS cut_bound_m,
@@ -105,7 +105,7 @@ FROM corners WHERE NOT stands GROUP BY 1, 2 ORDER BY 1, 2""",  # noqa: S608 - nu
         ),
         Question(
             "drift",
-            "How do a rover's corners change from month to month, against the drive model's bound?",
+            "How do a rover's corners change from month to month, compared with the drive model's bound?",
             """SELECT month, vehicle, count(*) AS corners,
     round(quantile_cont(inside_excess_m, 0.5), 3) AS cut_excess_median_m,
     round(quantile_cont(inside_excess_m, 0.95), 3) AS cut_excess_95_m,

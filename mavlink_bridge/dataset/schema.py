@@ -255,7 +255,7 @@ _GRADES = Table(
             *("predicted_took_s", "as predicted", "predicted_least_clearance_m", "as predicted"),
             *("predicted_deviation_m", "as predicted"),
         ),
-        *_texts("notes", "what to know before comparing; several are parted by semicolons"),
+        *_texts("notes", "what to know before comparing; several are separated by semicolons"),
     ),
 )
 _LEGS = Table(

@@ -92,7 +92,7 @@ class Dataset:
     def __init__(self, folder: Path) -> None:
         if named := [part for part in folder.parts if part.startswith(_PARTITIONED)]:
             raise DatasetError(
-                f"{folder}: DuckDB takes a folder's name {named[0]!r} for the rows' own",
+                f"{folder}: DuckDB reads a folder's name {named[0]!r} for the rows' own",
                 folder=str(folder),
                 advice="choose a folder with another name",
             )
@@ -104,7 +104,7 @@ class Dataset:
             self._read_list()
         elif folder.exists() and (not folder.is_dir() or not _is_ours(folder)):
             raise DatasetError(
-                f"{folder} is no dataset: it holds other files",
+                f"{folder} is not a dataset: it holds other files",
                 folder=str(folder),
                 advice="choose a new folder, or one that `pbpp logs build` made",
             )
@@ -125,7 +125,7 @@ class Dataset:
             raise DatasetError(
                 f"{path} cannot be read: {error}",
                 file=str(path),
-                advice="build the dataset anew, in another folder",
+                advice="build the dataset again, in another folder",
             ) from None
         if version != SCHEMA_VERSION:
             raise DatasetError(
@@ -133,7 +133,7 @@ class Dataset:
                 folder=str(self.folder),
                 found=version,
                 expected=SCHEMA_VERSION,
-                advice="build it anew, in another folder",
+                advice="build it again, in another folder",
             )
         self._files, self._published = files, published
 

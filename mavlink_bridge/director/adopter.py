@@ -162,7 +162,7 @@ class Adopter(Part):
             try:
                 core.plan = plan_again(note.record)
             except MissionError as error:
-                why_not = f"it cannot be followed again: {error}"
+                why_not = f"it cannot be followed: {error}"
         if why_not:
             self._tell_why_not(why_not, now_s)
             return False

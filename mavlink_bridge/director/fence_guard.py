@@ -154,8 +154,8 @@ class FenceGuard(Part):
         why = "".join(f"; {text}" for text in told)
         name = self.core.autopilot.kind
         trouble = RefusedError(
-            f"the mission is verified on the vehicle, but {name} does not take it for valid and would not drive it{why}",
-            advice="look at the fence and at GF_MAX_HOR_DIST: every waypoint has to lie within them",
+            f"the mission is verified on the vehicle, but {name} reports it as not valid and would not drive it{why}",
+            advice="check the fence and GF_MAX_HOR_DIST: every waypoint must be within them",
         )
         self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
         return self.core.fail_step(trouble)
@@ -223,7 +223,7 @@ class FenceGuard(Part):
             if zones:
                 self._tell_left_out(zones, reason, "", now_s)
         count, left_out = len(fence.value.zones), list(self._left_out)
-        text = f"the fence counts by now: {counted(count, 'zone')}"
+        text = f"the fence is in force: {counted(count, 'zone')}"
         text += f", but for {', '.join(left_out)}" if left_out else ""
         self.core.voice.tell(now_s, EventName.ENFORCED, text, count, fence.value.vertex_count, left_out)
 

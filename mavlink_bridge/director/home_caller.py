@@ -213,7 +213,7 @@ class HomeCaller(Part):
         """Report once that this RTL is the second one, which is not answered: who pressed it may wait for a route."""
         if now_s > self._second_s + SAME_PRESS_S:
             name = self.core.modes.words(mode)
-            text = f"second {name}: yours, it drives straight home"
+            text = f"second {name}: left to you, it drives straight home"
             why = "the second one: the vehicle is left to the operator"
             self.core.voice.tell(now_s, EventName.CALL_IGNORED, text, name, why)
         self._second_s = now_s
@@ -261,7 +261,7 @@ class HomeCaller(Part):
             return []
         if core.situation.armed and self._is_in_hand:
             return self._call(call, detail, now_s)
-        text = f"{_named(call, detail)}: not called home, for the vehicle is not on a drive of this bridge"
+        text = f"{_named(call, detail)}: not called home, because this bridge is not driving the vehicle"
         core.voice.tell(now_s, EventName.CALL_IGNORED, text, str(call), "not on a drive of this bridge")
         return []
 

@@ -187,7 +187,7 @@ class HomeKeeper(Part):
         orders = self.core.orders
         fence = replace(
             situation, obstacles=Obstacles()
-        )  # obstacles go: a drive home is planned round them then
+        )  # obstacles go: a drive home is planned around them then
         return WaysTask(fence, orders.request, orders.homing.places, ways)
 
     def _why_none(self, task: WaysTask, ways: WaysHome) -> str:

@@ -76,7 +76,7 @@ class HomeTask(PlanTask):
         fence = replace(self.situation, obstacles=Obstacles())
         ways = self.ways or home_field(fence, self.request, self.places)
         if (place := at_home(self.situation, ways)) is not None:
-            raise AtHomeError(f"at {place.name} already: nothing is driven", place=place.name)
+            raise AtHomeError(f"at {place.name} already: there is nothing to drive", place=place.name)
         return plan_home(
             self.situation, self.request, ways, planner=planner, should_stop=lambda: self.is_dropped
         )

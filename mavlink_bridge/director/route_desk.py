@@ -140,7 +140,7 @@ class RouteDesk(Part):
         if not (ends_so and core.orders.drive and core.autopilot.driving.leaves_mission_for_rtl):
             return None
         return SituationError(
-            f"{core.autopilot.kind} leaves its mission mode for an RTL item, which cannot be told from an operator who takes over; nothing was written: "
+            f"{core.autopilot.kind} leaves its mission mode for an RTL item, which looks like a takeover by an operator; nothing was written: "
             "plan the way home with --return, or upload it without --drive and start it yourself"
         )
 
@@ -247,7 +247,7 @@ class RouteDesk(Part):
 
     @property
     def _with_wider_obstacles(self) -> Situation:
-        """What is known, with obstacles as large as a route is planned round them."""
+        """What is known, with obstacles as large as a route is planned around them."""
         situation = self._at_rest
         return replace(situation, obstacles=situation.obstacles.later(_AGAIN_S, _WIDER_M))
 
@@ -392,7 +392,7 @@ class RouteDesk(Part):
         assert plan is not None
         assert plan.clearance_m is not None
         asked_m = core.orders.request.clearance_m or 0.0
-        found = Recheck(plan.clearance_m, asked_m, "--clearance was less when it began")
+        found = Recheck(plan.clearance_m, asked_m, "it began with a smaller --clearance")
         core.voice.rechecked(now_s, EventName.ROUTE_BROKEN, "the adopted route", found)
         return [Notice.ROUTE_OUTDATED] if core.orders.drive else []
 

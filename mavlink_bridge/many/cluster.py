@@ -153,7 +153,7 @@ def _other_versions(others: Mapping[str, object]) -> ClusterError:
         for worker, told in sorted(others.items())
     )
     return ClusterError(
-        f"refused: {named}; this program is {PACKAGE} {own}, and another version may measure otherwise",
+        f"refused: {named}; this program is {PACKAGE} {own}, and another version may measure differently",
         advice=_ADVICE.format(own),
         own_version=own,
         workers={worker: told if isinstance(told, str) else None for worker, told in others.items()},

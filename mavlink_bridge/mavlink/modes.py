@@ -53,7 +53,7 @@ class Modes:
     answer_counts : bool
         Whether ACCEPTED means that the vehicle is in the mode. PX4 1.17 accepts any mode, also one that it does not have: only its heartbeat counts.
     asked_by : callable
-        Returns param2 and param3 of the DO_SET_MODE that asks for a mode; None for a number that is no mode of this autopilot.
+        Returns param2 and param3 of the DO_SET_MODE that asks for a mode; None for a number that is not a mode of this autopilot.
     asked_for : callable
         Returns the mode that param2 and param3 of a DO_SET_MODE ask for; None where they are no mode of any kind.
     named : callable
@@ -83,11 +83,11 @@ class Modes:
         Raises
         ------
         ValueError
-            The number is no mode of this autopilot. Numbers are never handed on unseen: ArduPilot's HOLD (4) makes a PX4 rover drive its mission.
+            The number is not a mode of this autopilot. Numbers are never handed on unseen: ArduPilot's HOLD (4) makes a PX4 rover drive its mission.
         """
         asked = self.asked_by(mode)
         if asked is None:
-            raise ValueError(f"{mode} is no mode of this autopilot")
+            raise ValueError(f"{mode} is not a mode of this autopilot")
         return float(ModeFlag.CUSTOM_MODE_ENABLED), *asked
 
 

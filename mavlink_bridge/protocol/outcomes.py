@@ -34,7 +34,9 @@ _HELD = {
     Held.UNKNOWN: "what is on the vehicle now is unknown: read it back before driving",
 }
 _BROKEN_OFF = "the vehicle may hold the old list, the new one, or part of both: read it back before driving"
-_BROKEN_OFF_WHOLE = "the vehicle holds the old list or the new one, each whole: read it back to know which"
+_BROKEN_OFF_WHOLE = (
+    "the vehicle holds the complete old list or the complete new one: read it back to know which"
+)
 _INTERRUPTED = "interrupted"
 
 

@@ -39,7 +39,7 @@ RULES: dict[Rule, str] = {
     Rule.WAY_HOME: "A way home inside the mission is not safe.",
     Rule.NOT_CONFIRMED: "The drive is extrapolated beyond what was measured: its clearance is predicted, not promised.",
     Rule.UNUSABLE: "The mission, its fence or its vehicle cannot be used, so nothing was checked.",
-    Rule.REMARK: "What a person should know; the check does not fail by it.",
+    Rule.REMARK: "Something to know before the drive; the check does not fail because of it.",
 }
 """Each rule in a sentence, for reports that list them."""
 

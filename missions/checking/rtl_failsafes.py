@@ -60,7 +60,7 @@ _ADVISED = (
     ),
     ("FS_THR_ENABLE", 1.0, "failsafe when the transmitter is lost"),
     ("BATT_FS_LOW_ACT", 1.0, "RTL on a low battery, at BATT_LOW_VOLT or BATT_LOW_MAH"),
-    ("FENCE_ACTION", 2.0, "Hold after a breach: from beyond the fence no line was chosen"),
+    ("FENCE_ACTION", 2.0, "Hold after a breach: outside the fence no line was checked"),
     ("RTL_SPEED", 0.0, "RTL at WP_SPEED, for which the corridor is predicted"),
 )
 """Rover/failsafe.cpp and Rover/Parameters.cpp of ArduPilot: 1 is RTL, 2 Hold; FS_GCS_ENABLE and FS_THR_ENABLE 2 would go on with the mission in AUTO."""
@@ -69,7 +69,7 @@ _ADVISED = (
 def failsafe_advice(parameters: Mapping[str, float], vehicle: Vehicle) -> tuple[Failsafe, ...]:
     """Return what to set so that a vehicle drives home on its own, and what it is set to."""
     straight = (
-        (("OA_TYPE", 0.0, "RTL drives straight: the lines are free, a way of its own may not be"),)
+        (("OA_TYPE", 0.0, "RTL drives straight: the lines are free, a path of its own may not be"),)
         if vehicle.oa_type
         else ()
     )

@@ -77,7 +77,7 @@ def _beyond_loiter(vehicle: Vehicle) -> Iterator[str]:
     """Yield that a steered rover may go on steering at LOITER_UNLIM: since 4.5 it stands (AR_PosControl.cpp, November 2023), as measured on 4.5 and later."""
     if is_early(vehicle) and vehicle.steering is Steering.ACKERMANN:
         yield (
-            "ArduPilot before 4.5 goes on steering at LOITER_UNLIM, which was not measured; of a firmware before 4.6 it is not looked at which it is: "
+            "ArduPilot before 4.5 goes on steering at LOITER_UNLIM, which was not measured; versions before 4.6 are not told apart: "
             "use --end hold"
         )
 
@@ -91,7 +91,7 @@ def _beyond_short_drives(vehicle: Vehicle, band: Envelope) -> Iterator[str]:
         is_short = leg.length_m < SHORT_START_M and unsettled_m(vehicle, swung_m, leg.length_m) > 0
         if rests[number] and rests[number + 1] and turned and is_short:
             yield (
-                f"a steered rover that turns into a drive of {leg.length_m:.1f} m and stops was not measured, only on longer ones: it may circle to get "
+                f"a steered rover that turns and stops again after only {leg.length_m:.1f} m was not measured, only on longer drives: it may circle to get "
                 f"there; choose a target at least {SHORT_START_M:g} m away"
             )
             return
@@ -104,7 +104,7 @@ def _beyond_px4s(vehicle: Vehicle, least_mps: float, top_mps: float) -> Iterator
         if vehicle.steering is Steering.ACKERMANN:
             yield "how this PX4 rover steers is not known"
             return
-        yield "skid-steered rovers were not measured with PX4: how they turn on the spot follows from its source only"
+        yield "skid-steered rovers were not measured with PX4: how they turn on the spot is known from its source only"
         return
     known_mps = vehicle.speed_mps if steers.full_speed_mps is None else steers.full_speed_mps
     told = (

@@ -307,7 +307,7 @@ class HoldCheck:
     def _loop_sentence(self, aside_m: float) -> str:
         loops = (
             f"HOLD drives a loop: from {self.speed_mps:.2g} m/s up to {self.stopping_m:.1f} m ahead and {aside_m:.1f} m to a side, "
-            f"back to where it was taken ({self.source})"
+            f"back to where HOLD began ({self.source})"
         )
         if self.worst is None:
             return f"{loops}, inside the fence from anywhere on the route"

@@ -18,14 +18,15 @@ if TYPE_CHECKING:
     from missions.vehicle import Vehicle
 
 
-def lead_away_remarks(found: DrivenRoute, asked: Promise) -> list[str]:
-    """Return remarks on how near the start is to a fence, and what the route does about it."""
+def lead_away_remarks(found: DrivenRoute, asked: Promise, start_m: float | None) -> list[str]:
+    """Return remarks on how near the start is to a fence, and what the route keeps there: the plan's own figure, where it has one."""
     is_limited = found.lead_away_m is not None and found.lead_away_m < asked.required_m
     if not (found.lead_away or is_limited) or found.start_clearance_m < 0:
         return []
     if found.lead_away_m is None:
         return [start_near_text(found.start_clearance_m, asked.drawn_m, found.start_clearance_m)]
-    return [start_near_text(found.start_clearance_m, asked.promised_m, found.lead_away_m)]
+    kept_m = found.lead_away_m if start_m is None else start_m
+    return [start_near_text(found.start_clearance_m, asked.promised_m, kept_m)]
 
 
 def escape_info(found: DrivenRoute) -> list[str]:

@@ -79,7 +79,7 @@ def plan_route(
     items, seqs = mission_items(lines, vehicle.speed_mps, request.speed_mps)
     reached = tuple(rounded(ground.frame.to_lat_lon(target)) for target in found.targets)
     start_m = None if asked.allowance_m is not None else _start_m(band, lines, ground, asked, vehicle)
-    warnings += lead_away_remarks(found, asked)
+    warnings += lead_away_remarks(found, asked, start_m)
     warnings += drive_remarks(vehicle, heading_deg, asked, driven_m, found)
     warnings += pivot_remarks(plain, vehicle, band, seqs)
     less = _less_info(request, wanted, asked)

@@ -75,7 +75,7 @@ _ESCAPED = re.compile(r"\\x([0-9a-fA-F]{2})")
 """A letter beyond ASCII as programs write it that cannot hold it: M\\xfchle."""
 
 _THING = re.compile(
-    r"(?<![^\W\d_])((no|not|never|kein|keine) [^\W\d_]{3,}|danger|dangerous|hazard|warning|trees?|bush(es)?|hedges?|woods?|forests?|ponds?|lakes?|rivers?"
+    r"(?<![^\W\d_])((no|kein|keine) [^\W\d_]{3,}|not|never|don['’ ]?t|without|nicht|ohne|jamais|sans|senza|niet|danger|dangerous|hazard|warning|trees?|bush(es)?|hedges?|woods?|forests?|ponds?|lakes?|rivers?"
     r"|streams?|water|ditch(es)?|buildings?|house|barn|sheds?|walls?|rocks?|stones?|holes?|poles?|pylons?|roads?|pool|bed|protected|private"
     r"|baum|bäume|wald|teich|see|fluss|graben|gebäude|haus|gefahr|hindernis|arbres?|étang|árbol|árboles|albero|boom|bomen)(?![^\W\d_])"
 )

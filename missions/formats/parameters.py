@@ -101,7 +101,7 @@ def read(text: str, source: str) -> Situation:
     named = is_ardupilots(parameters)
     if told is not None and named not in (None, told):
         remarks.append(
-            f"{source}: a remark says that this is {_STACKS[told]}, but its parameters are {_STACKS[not told]}'s: they count"
+            f"{source}: a remark says that this is {_STACKS[told]}, but its parameters are {_STACKS[not told]}'s: the parameters decide"
         )
         told = named
     if (named if told is None else told) is False:

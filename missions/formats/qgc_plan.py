@@ -49,7 +49,7 @@ def read(text: str, source: str) -> Situation:
     made_for = _made_for(node, source)
     if mission and mission.items and made_for and made_for.vehicle_type not in _ON_THE_GROUND:
         remarks.append(
-            f"{source} is made for vehicle type {made_for.vehicle_type} (vehicleType), not for a rover ({_ROVER}): its mission is taken for a rover's"
+            f"{source} is made for vehicle type {made_for.vehicle_type} (vehicleType), not for a rover ({_ROVER}): its mission is read as a rover's"
         )
     fence = _fence(node["geoFence"]) if _is_of_version_2(node, "geoFence", remarks) else None
     rally = _rally(node["rallyPoints"]) if _is_of_version_2(node, "rallyPoints", remarks) else ()

@@ -243,7 +243,7 @@ def check_ground(ground: Ground) -> None:
         raise FenceError(f"the exclusions cover all of {names}", zones=inclusions)
     drawn = [b.area for b in ground.barriers if b.kind is ZoneKind.INCLUSION and not b.is_home_circle]
     is_circle_apart = len(drawn) < len(inclusions) and not shapely.intersection_all(drawn).is_empty
-    why = "set home inside the fence, or a greater radius" if is_circle_apart else _COMMON_GROUND
+    why = "set home inside the fence, or a larger radius" if is_circle_apart else _COMMON_GROUND
     raise FenceError(f"{names} have no area in common; {why}", zones=inclusions)
 
 

@@ -30,10 +30,10 @@ def own_promise_info(vehicle: Vehicle) -> list[str]:
         return []
     late = _STOPS.get(
         vehicle.fence.action,
-        "it acts only when the rover is inside (in tests up to 1.6 m at 1 m/s, 2.5 m at 3 m/s)",
+        "it acts only after a breach (in tests the rover stopped up to 1.6 m beyond the fence at 1 m/s, 2.5 m at 3 m/s)",
     )
     return [
-        f"PX4 keeps no margin to fences and does not avoid them: this route alone keeps the clearance. Its own fence (GF_ACTION {vehicle.fence.action}): {late}"
+        f"PX4 keeps no margin to fences and does not avoid them: only this route keeps the clearance. Its own fence (GF_ACTION {vehicle.fence.action}): {late}"
     ]
 
 
@@ -49,7 +49,7 @@ def unenforced_warnings(vehicle: Vehicle, situation: Situation, ground: Ground) 
         else []
     )
     return unknown + [
-        f"PX4 will not enforce {barrier.name}: {who} is {'outside' if barrier.kind is ZoneKind.INCLUSION else 'inside'} it; this route keeps to it all the same"
+        f"PX4 will not enforce {barrier.name}: {who} is {'outside' if barrier.kind is ZoneKind.INCLUSION else 'inside'} it; this route keeps to it anyway"
         for barrier, who in _unenforced(situation, ground)
     ]
 

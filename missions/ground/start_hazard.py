@@ -75,7 +75,9 @@ def start_hazard(ground: Ground, start: LocalPoint, vehicle: Vehicle) -> StartBl
 
 def _few_rows(vehicle: Vehicle) -> str:
     """Return what is to be said of firmware before 4.6, or that may be."""
-    return "" if vehicle.has_measured_corners else "; only 4 of these starts were before ArduPilot 4.6"
+    return (
+        "" if vehicle.has_measured_corners else "; only 4 of these starts were measured before ArduPilot 4.6"
+    )
 
 
 def nearest_avoided(ground: Ground, point: Point) -> tuple[float, str]:

@@ -77,7 +77,7 @@ def _told_of_obstacles(planned: Plan, situation: Situation) -> Plan:
     """Return a plan with the obstacles that it was made around told, each once."""
     obstacles = situation.obstacles
     told = [
-        f"planned round the {one.name}{_grown(one.radius_m, obstacles.radius_m(one))}; the autopilot does not know of it; this protects no person"
+        f"planned around the {one.name}{_grown(one.radius_m, obstacles.radius_m(one))}; the autopilot does not know of it; this protects no person"
         for one in obstacles.known
     ]
     return replace(planned, info=(*planned.info, *told)) if told else planned

@@ -119,5 +119,5 @@ def turning_hazard(vehicle: Vehicle) -> tuple[str, str]:
     """Return what avoidance does to a vehicle that keeps less while it turns, and what helps."""
     return (
         f"within {vehicle.fence.margin_name} {vehicle.stops_within_m:g} m its avoidance takes over, and backs it up towards the fence",
-        "turn it by hand to face its way, or move it, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it has turned",
+        "turn it by hand to face the route, or move it, or set AVOID_BACKUP_SPD 0 or AVOID_ENABLE 0 until it has turned",
     )

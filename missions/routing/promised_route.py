@@ -137,8 +137,10 @@ class PromisedRoute:
         return min(driven, key=lambda one: one.cost_s)
 
     def _quickest_of_more(self, found: DrivenRoute, asked: Promise) -> DrivenRoute:
-        """Return a route, or a quicker one fitted to more clearance, where it is hard to fit: to a little more, and to the grid's next clearances."""
+        """Return a route, or a quicker one to the same places fitted to more clearance, where it is hard to fit: a little more, and the grid's next."""
         required_m = asked.required_m
+        if found.targets != tuple(self.sought.targets):
+            return found  # a blocked target was moved as little as has to be: at more clearance it would be moved further
         if (
             _lost_share(found) > _MUCH_LOST and _kept_m(found) < required_m + STEP_M
         ):  # else a little more was tried

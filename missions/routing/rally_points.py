@@ -142,7 +142,7 @@ def choose_rally_points(
     """
     if checked.vehicle.autopilot is not Autopilot.ARDUPILOT:
         raise RouteError(
-            f"rally points are chosen by how ArduPilot's RTL takes one; the vehicle is {checked.vehicle.autopilot}, which takes them otherwise",
+            f"rally points are chosen for ArduPilot's RTL; the vehicle is {checked.vehicle.autopilot}, which takes them otherwise",
             advice="draw them in the ground station, and upload them with pbpp upload",
         )
     asked = promise(situation, request, checked.vehicle)
@@ -184,7 +184,7 @@ def _nothing_found(
     less = "" if accepts_less else "accept less clearance (--accept-less), "
     return NoRouteError(
         f"no set of at most {most} rally points was found with which RTL's straight line keeps {metres(field.promised_m)} from the whole route: "
-        f"with the best set it does not from {left_m:.0f} m of {route_m:.0f} m, first at {first}",
+        f"with the best set found the line is not free from {left_m:.0f} m of the {route_m:.0f} m, first at {first}",
         most=most,
         clearance_m=round(field.promised_m, 3),
         left_m=round(left_m, 1),

@@ -190,7 +190,7 @@ def with_end(planned: Plan, situation: Situation, request: Tour) -> Plan:
         return planned
     if end is End.LOITER and planned.vehicle.pursuit is not None:
         raise VehicleError(
-            "a PX4 rover with steered wheels does not stand where it loiters: it circles, and that was measured of LOITER_TIME only; use --end hold",
+            "a PX4 rover with steered wheels does not stand where it loiters: it circles, and that was measured for LOITER_TIME only; use --end hold",
             end=end.value,
             advice="use --end hold",
         )

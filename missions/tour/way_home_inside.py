@@ -113,7 +113,7 @@ def with_way_home_inside(
     if not builder.chains:
         raise NoRouteError(f"no leg has a way home: {builder.without[0]}", advice="see pbpp check --place")
     parts = home_parts(items)
-    told = f"ways home inside: {len(items) - len(planned.items)} items for {counted(len(parts), 'leg')}; while item N is driven, choose the item of the way home from there: "
+    told = f"ways home inside: {len(items) - len(planned.items)} items for {counted(len(parts), 'leg')}; to go home while the vehicle drives to an item, choose the item after the arrow: "
     told += ", ".join(f"{part.leg_item} → {part.item}" for part in parts)
     return replace(
         planned, items=items, info=(*planned.info, told), warnings=(*planned.warnings, *builder.without)

@@ -75,7 +75,7 @@ def made_for_remarks(situation: Situation) -> list[str]:
     is_alone = situation.ardupilot is None and is_ardupilots(situation.parameters) is None
     if is_alone and not made_for.ardupilot:
         return [
-            f"the vehicle is taken for {name}, as {made_for.source} says (firmwareType), for none of its parameters is known; give them with --vehicle FILE: those of an ArduPilot rover count more"
+            f"assuming {name}, as {made_for.source} says (firmwareType): none of the vehicle's parameters is known; give them with --vehicle FILE, they take precedence"
         ]
     return []
 

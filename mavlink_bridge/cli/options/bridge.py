@@ -27,7 +27,7 @@ class ObstacleOptions:
     obstacles_from: Annotated[
         list[str],
         option(
-            "Plan round reported obstacles, and hold for them with --drive: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
+            "Plan around reported obstacles, and with --drive hold for them: OBSTACLE_DISTANCE (a sensor's messages), keyboard (type blocked, clear); "
             "repeatable, or with commas. This protects no person.",
             "SOURCE",
             panel=_OBSTACLES,
@@ -36,7 +36,7 @@ class ObstacleOptions:
     obstacle_growth: Annotated[
         float,
         option(
-            "How fast an obstacle is taken to move, until it has been watched for 1.5 s.",
+            "Assumed speed of an obstacle until it has been watched for 1.5 s.",
             "MPS",
             panel=_OBSTACLES,
             parser=within(0.0, MOST_MPS, "metres a second"),
@@ -84,14 +84,14 @@ class HomingOptions:
     gcs_timeout: Annotated[
         float | None,
         option(
-            "With --rtl-by-route: also bring it home when no ground station was heard for S seconds, once one was.",
+            "With --rtl-by-route: also bring it home when no ground station was heard for S seconds, after one had been heard.",
             "S",
             parser=within(2.0, MOST_S, "seconds"),
         ),
     ] = None
     place: Annotated[
         list[str],
-        option("A place to go home to, beside home and the rally points; repeatable.", "NAME=LAT,LON"),
+        option("A place to go home to, besides home and the rally points; repeatable.", "NAME=LAT,LON"),
     ] = field(default_factory=list)
 
 
@@ -136,7 +136,10 @@ class BridgeOptions(ObstacleOptions, HomingOptions, DescriptionOptions, VehicleL
     arm: Annotated[bool, flag("--arm", "With --drive: arm before AUTO.")] = False
     confirm: Annotated[
         bool,
-        flag("--confirm", "Upload a plan only after you type yes; a way home of --rtl-by-route at once."),
+        flag(
+            "--confirm",
+            "Upload a plan only after you type yes. Ways home (--rtl-by-route) are uploaded at once.",
+        ),
     ] = False
     escape: Annotated[
         bool,

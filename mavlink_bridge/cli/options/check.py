@@ -27,7 +27,7 @@ from mavlink_bridge.cli.options.shared import (
 class CheckOptions(DescriptionOptions, MapOptions, ClearanceOptions, ManyOptions, LinkOptions):
     """Check every leg of a mission against a fence: the clearance of its straight line and of the predicted track. Exit 8 if a leg fails.
 
-    Several missions are checked at the same time, each against `--fence` or else the fence in its own file. One that cannot be read stops no other.
+    Several missions are checked at the same time, each against `--fence` or else the fence in its own file. A mission that cannot be read does not stop the others.
 
     For example:
 

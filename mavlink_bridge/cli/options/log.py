@@ -15,7 +15,7 @@ from mavlink_bridge.cli.options.shared import CommonOptions, SystemOption, flag,
 class LogOptions(CommonOptions):
     """Summarise telemetry logs: who speaks, fences and missions transferred, targets, modes, the drive and its clearance.
 
-    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction. The verdict stands last.
+    Drives of a mission (AUTO) are graded: least clearance, deviation and time against the drive model's prediction. The verdict comes last.
 
     For example:
 
@@ -24,7 +24,10 @@ class LogOptions(CommonOptions):
     `pbpp log *.tlog --json`
     """
 
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Telemetry logs: .tlog, .raw, .gz.")]
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Logs: .tlog, .raw, DataFlash .bin, also packed with gzip."),
+    ]
     plot: Annotated[
         list[Path],
         option(

@@ -19,7 +19,7 @@ class LogsOptions(ManyOptions, CommonOptions):
     """Make tables of many logs, ask them questions, and calibrate the drive model to one rover.
 
     `build` reads all logs in folders (.tlog, .raw, DataFlash .bin, packed with gzip or not) into a dataset of Parquet files. Logs that it already
-    has are skipped; bad ones are listed and stop nothing. `ask` answers a ready question (clearance, promise, corners, drift, links, modes) or SQL.
+    has are skipped; bad ones are listed and do not stop the others. `ask` answers a ready question (clearance, promise, corners, drift, links, modes) or SQL.
     `calibrate` writes how one rover drives, for `--vehicle` of other commands.
 
     For example:

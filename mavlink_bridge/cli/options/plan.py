@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from mavlink_bridge.cli.options.shared import (
+    MANY_PANEL,
     OUTPUT_PANEL,
     VEHICLE_PANEL,
     AcceptLessOption,
@@ -50,7 +51,7 @@ class TourOptions:
         bool,
         flag(
             "--way-home-inside",
-            "Add behind the mission's end, for each leg, a way home that you can choose while the vehicle drives that leg.",
+            "After the mission's end, add a way home for each leg; choose its item while the vehicle drives that leg.",
             _TOURS,
         ),
     ] = False
@@ -73,7 +74,7 @@ class BesideFenceOptions:
     obstacle: Annotated[
         list[str],
         option(
-            "With --fence or --log: plan round this too, as the bridge does round what is reported to it; no file and no vehicle gets it. Repeatable.",
+            "With --fence or --log: also plan around this circle, as the bridge does around reported obstacles; it is not written to a file or vehicle. Repeatable.",
             "LAT,LON,RADIUS",
         ),
     ] = field(default_factory=list)
@@ -107,6 +108,7 @@ class PlanOptions(
         option(
             "Make a plan for each row of a table (.csv, .jsonl, .parquet) with columns fence, start, target, vehicle, clearance, …; writes JSON lines, or -o FILE.jsonl, FILE.parquet.",
             "TABLE",
+            panel=MANY_PANEL,
         ),
     ] = None
     fence: Annotated[Path | None, option("Fence file: .waypoints, .plan, .kml, …", "FILE")] = None

@@ -22,7 +22,7 @@ from mavlink_bridge.cli.options.shared import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RallyOptions(DescriptionOptions, MapOptions, ClearanceOptions, LinkOptions):
-    """Choose rally points so that RTL's straight line is free from every point of a mission: for the day on which the companion computer fails.
+    """Choose rally points so that RTL's straight line is free from every point of a mission, in case the companion computer fails.
 
     For example:
 

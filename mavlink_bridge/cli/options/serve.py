@@ -29,7 +29,7 @@ class ServerOptions:
     listen: Annotated[
         str,
         option(
-            "Where to listen. Beyond this computer (0.0.0.0:8080) the printed link holds a token. Default: a free port from 8080 on.",
+            "Where to listen. For other devices (0.0.0.0:8080) the printed link holds a token. Default: a free port from 8080 on.",
             "HOST:PORT",
             panel=_SERVER,
         ),
@@ -70,7 +70,7 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
     speedup: Annotated[
         float,
         option(
-            "With --demo: how many times faster than real time the rover's own time runs, if the computer keeps up.",
+            "With --demo: how many times faster than real time the rover runs, if the computer keeps up.",
             "X",
             panel=_SOURCE,
             parser=within(1.0, 20.0),
@@ -79,7 +79,7 @@ class ServeOptions(ServerOptions, DescriptionOptions, MapOptions, ClearanceOptio
     autopilot: Annotated[
         str | None,
         option(
-            "With --demo: the autopilot that the rover answers as, ardupilot (the default) or px4; --firmware is then its version.",
+            "With --demo: the autopilot to simulate, ardupilot (the default) or px4; --firmware sets its version.",
             "AUTOPILOT",
             panel=_SOURCE,
             parser=autopilot_from,

@@ -75,7 +75,7 @@ def cluster_option(text: str) -> str:
     """Return the address of a scheduler that an option names; another text is wrong usage."""
     if re.fullmatch(r"(tcp|tls)://[^/\s]+:\d+", text) is None:
         raise typer.BadParameter(
-            f"{text!r} is no address of a dask scheduler, such as tcp://192.168.1.10:8786"
+            f"{text!r} is not the address of a dask scheduler, such as tcp://192.168.1.10:8786"
         )
     return text
 
@@ -90,7 +90,7 @@ FirmwareOption = Annotated[
     ),
 ]
 SimulatedAutopilotOption = Annotated[
-    str, option("The autopilot that it answers as: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
+    str, option("The autopilot to simulate: ardupilot or px4.", "AUTOPILOT", parser=autopilot_from)
 ]
 SimulatedFirmwareOption = Annotated[
     Firmware | None,
@@ -103,18 +103,18 @@ SimulatedFirmwareOption = Annotated[
 PlaceOption = Annotated[
     list[str],
     option(
-        "A place to go home to, beside home and the rally points; repeatable. The ways home are in --json and pictures.",
+        "A place to go home to, besides home and the rally points; repeatable. The ways home are in --json and pictures.",
         "NAME=LAT,LON",
     ),
 ]
 MOST_JOBS = 1024  # chosen: more processes than any computer has cores are a mistake in typing
-_MANY_PANEL = "Many at once"
+MANY_PANEL = "Many at once"
 JobsOption = Annotated[
     int | None,
     option(
         "How many processes work at the same time. Default: one per processor.",
         "N",
-        panel=_MANY_PANEL,
+        panel=MANY_PANEL,
         min=1,
         max=MOST_JOBS,
     ),
@@ -124,7 +124,7 @@ ClusterOption = Annotated[
     option(
         "Use the workers of this dask scheduler instead (extra cluster).",
         "tcp://HOST:PORT",
-        panel=_MANY_PANEL,
+        panel=MANY_PANEL,
         parser=cluster_option,
     ),
 ]

@@ -15,8 +15,8 @@ from mavlink_bridge.cli.options.shared import (
 )
 from mavlink_bridge.cli.values import MOST_S, within
 
-MOST_SEED = 2**63 - 1
-"""What fits everywhere a seed is kept."""
+MOST_SEED = 2**31 - 1
+"""Chosen, not measured: more seeds than anybody tries, and short in the help."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +47,8 @@ class SimOptions(MapOptions, CommonOptions):
     disc: Annotated[
         list[str],
         option(
-            "Something round in the field that the rover's distance sensor sees, up to 15 m away; it may move. Repeatable.",
-            "LAT,LON,RADIUS[,SPEED,HEADING]",
+            "A round object of radius R that the rover's distance sensor sees, up to 15 m away; it may move. Repeatable.",
+            "LAT,LON,R[,SPEED,HEADING]",
         ),
     ] = field(default_factory=list)
     autopilot: SimulatedAutopilotOption = "ardupilot"
@@ -70,5 +70,5 @@ class SimOptions(MapOptions, CommonOptions):
         float,
         option("Random extra delay, up to so many seconds.", "S", parser=within(0.0, MOST_S, "seconds")),
     ] = 0.0
-    seed: Annotated[int, option("Random seed of the link's faults.", "N", min=-MOST_SEED, max=MOST_SEED)] = 0
+    seed: Annotated[int, option("Random seed of the link's faults.", "N", min=0, max=MOST_SEED)] = 0
     system: Annotated[int, option("MAVLink system id.", "N", min=1, max=255)] = 1

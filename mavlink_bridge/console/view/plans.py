@@ -236,7 +236,7 @@ def _leg_text(leg: CheckedLeg, verdict: Verdict) -> str:
     if verdict == "breaks":
         return f"{kept}; {metres(leg.asked_m)} is required"
     if verdict == "near":
-        return f"{kept}, as near as the start leaves it"
+        return f"{kept}, as much as the start allows"
     return f"{kept}, predicted but not measured" if verdict == "extrapolated" else kept
 
 

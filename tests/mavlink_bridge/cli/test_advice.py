@@ -116,7 +116,7 @@ ADVICE = {
     "LogError": None,
     "DatasetError": None,
     "ClusterError": None,
-    "LostWorkerError": "give the machine more memory, or leave out what the worker died at",
+    "LostWorkerError": "give the machine more memory, or leave out the file or row at which the worker died",
     "LinkError": "is the vehicle on, and is another program using the port? `pbpp doctor` lists the serial ports",
     "IdentityTakenError": "use another component id: --source-component",
     "VehicleNotFoundError": "choose another vehicle with --system N",

@@ -202,7 +202,10 @@ def test_where_results_cannot_be_told_that_is_the_error(tmp_path):
         full = pbpp_in_shell(f"diff a.waypoints b.waypoints {words} > /dev/full", tmp_path)
         assert (full.returncode, full.stderr.splitlines()) == (
             3,
-            ["error: standard output cannot be written: No space left on device", "advice: make room there"],
+            [
+                "error: standard output cannot be written: No space left on device",
+                "advice: free some space there",
+            ],
         )
     silent = pbpp_in_shell("convert a.waypoints none/a.plan 2> /dev/full", tmp_path)
     assert silent.returncode == 3

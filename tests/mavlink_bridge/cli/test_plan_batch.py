@@ -121,8 +121,8 @@ def test_json_lines_and_parquet_say_the_same(table):
     ("name", "text", "message"),
     [
         ("a.csv", "fence,clearence\nx,2\n", "unknown column 'clearence'"),
-        ("a.csv", "fence,start, start\nx,2,3\n", "column 'start' is there twice"),
-        ("a.jsonl", '{"start": "1,2", "start": "3,4"}\n', "a key is there twice"),
+        ("a.csv", "fence,start, start\nx,2,3\n", "column 'start' appears twice"),
+        ("a.jsonl", '{"start": "1,2", "start": "3,4"}\n', "a key appears twice"),
         ("a.csv", "fence\nx,2\n", "a.csv: line 2: more cells than the 1 columns"),
         ("a.csv", b"fence\n\xff\n", "a.csv is not a text file; expected UTF-8"),
         ("a.csv", "fence\n".encode("utf-16-le"), "unknown column"),

@@ -97,7 +97,7 @@ def test_of_its_mission_nothing_is_claimed(tmp_path: Path, command: tuple[str, .
     code, found = run(*command, log := px4_log(tmp_path / "px4.tlog"))
     assert (code, found["error"]) == (3, "LogError")
     assert found["message"] == (
-        f"{log}: the autopilot of system 1 is not ArduPilot: its own mission is not taken from a log; give it as a file (--mission)"
+        f"{log}: the autopilot of system 1 is not ArduPilot: its mission in a log is not used; give it as a file (--mission)"
     )
 
 
@@ -142,7 +142,7 @@ def fence_plan(path: Path, firmware: int) -> Path:
 @pytest.mark.parametrize(
     ("firmware", "parameters", "says_px4", "told", "clearance_m"),
     [
-        (12, None, True, "the vehicle is taken for PX4, as ", None),
+        (12, None, True, "assuming PX4, as ", None),
         (12, MEASURED, True, None, 1.0),
         (3, MEASURED, True, "is made for ArduPilot (firmwareType), but the vehicle is PX4", 1.0),
         (3, None, False, None, 2.5),
@@ -195,7 +195,7 @@ def test_a_mission_of_px4_is_counted_without_home(tmp_path: Path) -> None:
     plan.write_text(json.dumps(document))
     _, found = run("check", "--mission", plan, "--vehicle", tmp_path / "rover.params")
     assert (
-        "501 mission items; the vehicle holds 500 (or 1000, by its board: no parameter says which)"
+        "501 mission items; the vehicle holds 500 (or 1000, depending on the board; no parameter tells which)"
         in found["warnings"]
     )
 

@@ -346,7 +346,7 @@ class TestEveryModeThatIsSent:
             session.change_mode(modes.hold)
             other = ARDUPILOT_MODES if modes is PX4_MODES else PX4_MODES
             for mode in (other.hold, other.mission, other.rtl):
-                with pytest.raises(ValueError, match="is no mode of this autopilot"):
+                with pytest.raises(ValueError, match="is not a mode of this autopilot"):
                     session.change_mode(mode)
 
 

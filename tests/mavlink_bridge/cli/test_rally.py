@@ -59,7 +59,7 @@ def test_points_are_chosen_written_drawn_and_told(mission, tmp_path):
     outputs = ("-o", plan, "-o", list_file, "-o", parameters, "--plot", picture)
     result = run("rally", "--mission", mission, "--clearance", "2", *outputs, *KNOWN)
     assert "RTL's straight lines from the whole route keep 2.00 m while driving" in result.output
-    assert "They hold only with RALLY_INCL_HOME 0, RALLY_LIMIT_KM 0" in result.output
+    assert "The rally points are valid only with RALLY_INCL_HOME 0, RALLY_LIMIT_KM 0" in result.output
     assert "FS_ACTION 1: RTL on a failsafe" in result.output
     together = read_situation(plan)
     assert together.mission is not None

@@ -166,7 +166,7 @@ class Watched:
             typed = self.page.get_by_role("textbox", name=f"Corner {n}: latitude, longitude").input_value()
             lat_deg, lon_deg = map(float, typed.split(","))
             places.append((lon_deg, lat_deg))
-        self.page.get_by_role("button", name="Back to the held fence").click()
+        self.page.get_by_role("button", name="Back to the vehicle's fence").click()
         self.scale = (corners[0], places[0], [(places[1][i] - places[0][i]) / 0.4 for i in (0, 1)])
 
     def shares(self, lon_deg: float, lat_deg: float) -> tuple[float, float]:

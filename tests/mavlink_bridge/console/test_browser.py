@@ -82,17 +82,17 @@ def test_a_click_is_planned_and_a_dragged_way_point_is_judged_at_once(watched: W
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x - 8, y + 40, steps=4)
-    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    expect(page.locator(".headline")).to_contain_text(re.compile("keep the clearance"))
     page.mouse.up()
-    assert "BREAKS IT" in legs(page)
+    assert "TOO NEAR" in legs(page)
     page.get_by_role("button", name="Repair around the fence").click()
     expect(page.locator(".headline")).to_contain_text("✓")
     page.locator("body").press("Control+z")
-    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    expect(page.locator(".headline")).to_contain_text(re.compile("keep the clearance"))
     page.locator("body").press("Control+z")
     expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
     page.locator("body").press("Control+y")
-    expect(page.locator(".headline")).to_contain_text(re.compile("breaks? the promise"))
+    expect(page.locator(".headline")).to_contain_text(re.compile("keep the clearance"))
     assert watched.accessible() == []
 
 
@@ -156,7 +156,7 @@ def test_a_fence_is_drawn_typed_edited_and_undone(watched: Watched) -> None:
     page.get_by_label("A corner a line").fill("40.0716, -105.2299\n40.0716, -105.2298\n40.0717, -105.2298")
     page.get_by_role("button", name="Add the zone").click()
     expect(page.locator("ol.plain > li")).to_have_count(12)
-    expect(page.get_by_text("Drawn here; plans already go round it.")).to_be_visible()
+    expect(page.get_by_text("Drawn here; plans already go around it.")).to_be_visible()
 
     # Its corners are buttons on the map, too.
     page.get_by_role("button", name=re.compile(r"^Corner 1\.")).focus()

@@ -103,7 +103,7 @@ def move_a_way_point(seen: Watched) -> None:
     seen.page.get_by_role("button", name="Waypoint 1.").focus()
     for _ in range(6):
         seen.page.keyboard.press("Shift+ArrowRight")
-    expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? breaks? the promise"))
+    expect(seen.page.locator(HEADLINE)).to_contain_text(re.compile("legs? do(es)? not keep the clearance"))
 
 
 def back_to_planning(seen: Watched) -> None:
@@ -149,9 +149,9 @@ def arrive(seen: Watched) -> None:
 
 # Each step of the tutorial with its words: whoever changes one changes the other.
 STEPS = [
-    ("Press **Take control**. Other pages can look now, and press HOLD.", take_control),
+    ("Press **Take control**. Other pages can now only watch, and press HOLD.", take_control),
     (
-        "Open **Fence**, press **Draw a circle**, and click its middle and its rim in the green. It is a place to keep out of.",
+        "Open **Fence**, press **Draw a circle**, and click its centre and its rim in the green area. The rover will keep out of it.",
         draw_a_circle,
     ),
     (
@@ -159,7 +159,7 @@ STEPS = [
         upload_the_fence,
     ),
     (
-        'Open **Plan** and click the map where the rover shall go, some way off. The route appears with what it promises: "2.50 m promised".',
+        'Open **Plan** and click the map where the rover should go, some way off. The route appears with the clearance that it promises: "2.50 m promised".',
         click_a_target,
     ),
     (
@@ -167,7 +167,7 @@ STEPS = [
         type_a_clearance,
     ),
     (
-        "Drag a waypoint across the fence, or move it there with the arrow keys. The headline says at once how many legs break the promise.",
+        "Drag a waypoint across the fence, or move it there with the arrow keys. The headline says at once how many legs do not keep the clearance.",
         move_a_way_point,
     ),
     ("Press **Back to planning**.", back_to_planning),
@@ -182,7 +182,7 @@ STEPS = [
         go_on,
     ),
     (
-        'Wait until the state is "arrived". Below stands what was driven against what was promised, before HOLD and after it.',
+        'Wait until the state is "arrived". The table below compares what was driven with what was promised, before HOLD and after it.',
         arrive,
     ),
 ]
@@ -308,7 +308,7 @@ def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
         seen = open_page(browser, server.url, expected=r"net::ERR_|WebSocket connection")
         set_target(seen.page, "40.0723079, -105.2285800")
         server.stop()
-        expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost pbpp")
+        expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost its connection to pbpp")
         with serving("--fence", fence, "--start", "40.0712247,-105.2302031", port=port):
             expect(seen.page.locator(".alarm-bar")).to_be_hidden()
             # What was asked for is still there, and can be asked again.

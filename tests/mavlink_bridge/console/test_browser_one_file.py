@@ -115,7 +115,7 @@ def test_a_plan(opened):
     expect(page).to_have_title("218.2 m, about 114 s – PBPP Rover")
     expect(page.locator(".headline")).to_have_text("✓ 2.50 m promised")
     expect(page.locator("table.legs tbody tr")).to_have_count(5)
-    expect(page.get_by_text("A picture in one file: nothing in it is live.")).to_be_visible()
+    expect(page.get_by_text("A page in one file: nothing on it is live.")).to_be_visible()
     assert [one.inner_text() for one in page.get_by_role("tab").all()] == ["Plan", "Fence"]
     seen_there = pixels(seen)
     assert min(seen_there[name] for name in ("route", "fence", "exclusion")) > 150, seen_there
@@ -132,7 +132,7 @@ def test_a_plan(opened):
 
 def test_a_check(opened):
     seen = opened(*CHECK)
-    expect(seen.page.locator(".headline")).to_have_text("✗ 1 leg breaks the promise")
+    expect(seen.page.locator(".headline")).to_have_text("✗ 1 leg does not keep the clearance")
     seen_there = pixels(seen)
     assert min(seen_there[name] for name in ("broken", "fence", "exclusion")) > 150, seen_there
 

@@ -255,7 +255,7 @@ def test_deeds_are_done_in_the_bridges_own_loop(shown, monkeypatch):
 def test_a_bridge_that_does_not_answer_is_not_waited_for(shown, monkeypatch):
     monkeypatch.setattr("mavlink_bridge.console.live._ANSWER_S", 0.05)
     (problem,) = asked(shown.backend, lambda: None)
-    assert "whether it was done is not known" in problem.message
+    assert "it is not known whether that was done" in problem.message
 
 
 @pytest.mark.parametrize(
@@ -333,7 +333,7 @@ def test_hold_is_done_though_its_page_does_not_wait_any_more_and_before_all_else
         await asyncio.sleep(0)
         shown.backend.take_asked(shown.run.now_s)
         assert "sent" in await late
-        with pytest.raises(Refusal, match="HOLD came after it"):
+        with pytest.raises(Refusal, match="HOLD was pressed after it"):
             await begun
 
     asyncio.run(ask())

@@ -50,12 +50,12 @@ def driving(console) -> SteppedConsole:
 def test_a_plan_that_was_looked_at_is_made_again_uploaded_started_and_driven(tmp_path):
     console = ready(tmp_path)
     looked = looked_at(console)
-    assert "same plan" in console.do(deeds.UploadPlan(looked.view.id, looked))
+    assert "planning again from where the rover is" in console.do(deeds.UploadPlan(looked.view.id, looked))
     console.until(lambda: console.director.state is State.VERIFIED)
     assert plan_id(console.director.plan) == looked.view.id
     console.wait(5.0)
     assert console.director.state is State.VERIFIED  # nothing drives before somebody starts it
-    with pytest.raises(Refusal, match="another plan"):
+    with pytest.raises(Refusal, match="not the one that you see"):
         console.do(deeds.Start("of yesterday"))
     console.do(deeds.Start(looked.view.id))
     console.until(console.run.happened(EventName.ARRIVED), 200)
@@ -74,7 +74,7 @@ def test_a_plan_that_is_another_one_by_now_is_shown_and_not_uploaded(tmp_path):
     console.until(lambda: console.director.state is State.PROPOSED)
     console.wait(3.0)
     assert console.director.state is State.PROPOSED
-    assert any("another one by now" in text for text, _ in console.told)
+    assert any("the plan has changed" in text for text, _ in console.told)
     console.do(deeds.UploadPlan(plan_id(console.director.plan)))  # seen now
     console.until(lambda: console.director.state is State.VERIFIED)
 
@@ -131,11 +131,11 @@ def test_who_takes_control_ends_what_another_page_waits_for(tmp_path, state):
     gone_on(console)
     console.until(lambda: console.director.state is state)
     console.do(deeds.TakeControl(), "page 1")  # its own: nothing changes
-    assert not any("not done" in text for text, _ in console.told)
+    assert not any("is cancelled" in text for text, _ in console.told)
     console.do(deeds.TakeControl(), "page 2")
     what = "start" if state is not State.PLANNING else "drive on"
     assert console.told[-1] == (
-        f"page 2 has control now: the {what} that page 1 waited for is not done",
+        f"page 2 has control now: the {what} that page 1 waited for is cancelled",
         "warning",
     )
     console.wait(70.0)
@@ -153,13 +153,13 @@ def test_a_deed_of_the_next_page_ends_what_the_last_one_waits_for_and_so_does_gi
     console = ready(tmp_path)
     gone_on(console)
     console.do(deeds.ClearBlocked(), "page 2")
-    assert "waited for is not done" in console.told[-1][0]
+    assert "waited for is cancelled" in console.told[-1][0]
     console.wait(70.0)
     assert console.director.state is State.PROPOSED
     console.do(deeds.Resume(), "page 2")
     console.do(deeds.GiveControl(), "page 2")
     assert (
-        "page 2 has given up control: the drive on that page 2 waited for is not done" in console.told[-1][0]
+        "page 2 has given up control: the drive on that page 2 waited for is cancelled" in console.told[-1][0]
     )
     console.wait(70.0)
     assert console.director.state is State.PROPOSED
@@ -168,7 +168,7 @@ def test_a_deed_of_the_next_page_ends_what_the_last_one_waits_for_and_so_does_gi
 def test_a_drive_that_has_begun_and_an_upload_under_way_go_on_under_other_hands(tmp_path):
     console = driving(ready(tmp_path))
     console.do(deeds.TakeControl(), "page 2")
-    assert not any("not done" in text for text, _ in console.told)
+    assert not any("is cancelled" in text for text, _ in console.told)
     console.until(console.run.happened(EventName.ARRIVED), 200)
     console.do(deeds.UploadPlan("x", looked_at(console, replace(FAR_TOUR, targets=(NEAR,)))), "page 2")
     console.until(lambda: console.director.state is State.UPLOADING)
@@ -180,7 +180,7 @@ def test_an_upload_that_is_still_planned_for_is_not_done_for_who_has_no_control(
     console = ready(tmp_path)
     console.do(deeds.UploadPlan("x", looked_at(console)))
     console.do(deeds.TakeControl(), "page 2")
-    assert "the upload that page 1 waited for is not done" in console.told[-1][0]
+    assert "the upload that page 1 waited for is cancelled" in console.told[-1][0]
     console.wait(20.0)
     assert console.director.state is State.PROPOSED
     assert not console.run.vehicles[0].mission[1:]
@@ -244,8 +244,8 @@ def test_what_cannot_be_done_now_is_refused_and_says_why(tmp_path):
     console = ready(tmp_path)
     for deed, said in (
         (deeds.Start("x"), "nothing to start"),
-        (deeds.Resume(), "no target to go on to"),
-        (deeds.UploadPlan("unknown"), "not known any more"),
+        (deeds.Resume(), "no target to continue to"),
+        (deeds.UploadPlan("unknown"), "no longer exists"),
         (deeds.TakeTargets(Tour()), "at least one target"),
         (deeds.Restore("../../etc/passwd"), "not the name of a backup"),
     ):
@@ -253,7 +253,7 @@ def test_what_cannot_be_done_now_is_refused_and_says_why(tmp_path):
             console.do(deed)
     console = driving(console)
     for deed in (deeds.UploadFence(FENCE), deeds.Resume()):
-        with pytest.raises(Refusal, match="at work"):
+        with pytest.raises(Refusal, match="is busy"):
             console.do(deed)
 
 
@@ -288,7 +288,7 @@ def test_a_backup_of_another_vehicle_is_not_put_back(tmp_path):
     console = ready(tmp_path)
     other = replace(console.vehicle(), uid="9999")
     path = console.store.keep(other, MissionType.FENCE, fence_to_items(FENCE))
-    with pytest.raises(Refusal, match="cannot be shown to be this vehicle"):
+    with pytest.raises(Refusal, match="may not be this vehicle"):
         console.do(deeds.Restore(path.name))
 
 
@@ -369,7 +369,7 @@ def test_nobody_goes_on_to_a_target_that_was_never_driven_to(tmp_path):
     console.do(deeds.TakeTargets(FAR_TOUR))
     console.until(lambda: console.director.awaits_confirmation)
     assert not console.desk.can_resume
-    with pytest.raises(Refusal, match="no target to go on to"):
+    with pytest.raises(Refusal, match="no target to continue to"):
         console.do(deeds.Resume())
     console.wait(5.0)
     assert not console.run.vehicles[0].is_armed

@@ -226,7 +226,7 @@ def test_corners_slowed_by_what_the_log_does_not_tell_narrow_nothing(tmp_path, d
     found = calibrate(made_dataset(tmp_path / "dataset", logs, driven_mps=driven_mps), None)
     (one,) = found.calibration.corners
     assert (one.inside_more_m < 0) == narrows
-    assert ("driven slower or faster than predicted" in " ".join(found.remarks)) != narrows
+    assert ("whose speed is unknown or differs" in " ".join(found.remarks)) != narrows
 
 
 SQUARE = [(0.0, 0.0), (0.0, 30.0), (30.0, 30.0), (30.0, 0.0), (0.0, 0.0)]
@@ -249,4 +249,4 @@ def test_corners_that_a_station_slowed_are_of_the_class_of_their_speed(tmp_path)
     found = calibrate(Dataset(tmp_path / "dataset"), None)
     counted = {(one.speed_from_mps, one.turn_from_deg): one.corners for one in found.calibration.corners}
     assert counted == {(1.0, 90.0): 3, (2.0, 90.0): 3}
-    assert not any("driven slower" in remark for remark in found.remarks)
+    assert not any("whose speed is unknown or differs" in remark for remark in found.remarks)

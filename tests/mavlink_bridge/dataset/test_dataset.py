@@ -325,7 +325,7 @@ print(left)
 
 def test_what_is_no_dataset_is_refused(tmp_path):
     (tmp_path / "mine.txt").touch()
-    with pytest.raises(DatasetError, match="is no dataset: it holds other files"):
+    with pytest.raises(DatasetError, match="is not a dataset: it holds other files"):
         Dataset(tmp_path)
     with pytest.raises(DatasetError, match="there is no dataset"):
         Dataset(tmp_path / "none").open()
@@ -372,7 +372,7 @@ def test_two_builds_at_once_do_not_mix(tmp_path, logs):
 @pytest.mark.parametrize("name", ["vehicle=9", "month=2020-01"])
 def test_a_folder_that_would_pass_for_a_column_is_refused(tmp_path, name):
     """DuckDB takes values from the names of all folders above a file: each row's vehicle would be 9."""
-    with pytest.raises(DatasetError, match=f"takes a folder's name '{name}' for the rows' own"):
+    with pytest.raises(DatasetError, match=f"reads a folder's name '{name}' for the rows' own"):
         Dataset(tmp_path / name / "fleet")
 
 

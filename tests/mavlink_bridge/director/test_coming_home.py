@@ -123,9 +123,10 @@ def test_the_first_rtl_is_answered_and_the_second_is_the_operators():
     assert left_alone(run, Mode.RTL)
     assert run.director.state is State.LET_GO
     assert len(texts(run, EventName.CALLED_HOME)) == 1
-    assert texts(run, EventName.CALL_IGNORED) == ["second RTL: yours, it drives straight home"]
+    assert texts(run, EventName.CALL_IGNORED) == ["second RTL: left to you, it drives straight home"]
     assert any(  # also to who reads on the transmitter or in the ground station
-        isinstance(one, m.Statustext) and one.text.endswith("second RTL: yours, it drives straight home")
+        isinstance(one, m.Statustext)
+        and one.text.endswith("second RTL: left to you, it drives straight home")
         for one in run.sent
     )
 
@@ -547,7 +548,7 @@ def test_one_that_stands_at_home_is_held_there():
     wait(run, 2)
     unheard(run, RTL)
     run.run_until(run.happened(EventName.AT_HOME), 20)
-    assert texts(run, EventName.AT_HOME) == ["at home already: nothing is driven; HOLD"]
+    assert texts(run, EventName.AT_HOME) == ["at home already: there is nothing to drive; HOLD"]
     wait(run, 10)
     assert (run.director.state, run.vehicles[0].mode) == (State.READY, Mode.HOLD)
 

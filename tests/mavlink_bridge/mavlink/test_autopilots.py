@@ -171,12 +171,12 @@ def test_every_command_of_the_table_is_one_that_the_simulated_vehicle_takes():
 class TestModes:
     @pytest.mark.parametrize("number", [4, 10, 11, 15, 0, 1, px4_mode(4, 3) | 1, px4_mode(1, 3), px4_mode(9)])
     def test_a_number_that_is_no_px4_mode_is_never_made_a_command(self, number):
-        with pytest.raises(ValueError, match=f"{number} is no mode of this autopilot"):
+        with pytest.raises(ValueError, match=f"{number} is not a mode of this autopilot"):
             PX4_MODES.command_params(number)
 
     @pytest.mark.parametrize("number", [px4_mode(4, 3), px4_mode(4, 4), px4_mode(1), 2, 99, -1])
     def test_nor_one_that_is_no_ardupilot_mode(self, number):
-        with pytest.raises(ValueError, match="is no mode of this autopilot"):
+        with pytest.raises(ValueError, match="is not a mode of this autopilot"):
             ARDUPILOT_MODES.command_params(number)
 
     def test_hold_and_mission(self):

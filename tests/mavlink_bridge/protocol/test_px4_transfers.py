@@ -246,7 +246,10 @@ class TestUploads:
         script.pass_time(0.1)
         assert machine.has_written
         said = str(end_of_upload(OSError(5, "the link broke"), Writing("mission", machine, None)))
-        assert "the vehicle holds the old list or the new one, each whole: read it back to know which" in said
+        assert (
+            "the vehicle holds the complete old list or the complete new one: read it back to know which"
+            in said
+        )
 
 
 class TestDownloads:
@@ -369,7 +372,7 @@ class TestModes:
 
     @pytest.mark.parametrize("number", [4, 10, 11, 15])
     def test_ardupilots_numbers_are_never_sent(self, number):
-        with pytest.raises(ValueError, match=f"{number} is no mode of this autopilot"):
+        with pytest.raises(ValueError, match=f"{number} is not a mode of this autopilot"):
             Script(ModeSwitch(ON_1_18, number))
 
     def test_a_driving_px4_is_known_by_its_own_mode(self):

@@ -71,7 +71,7 @@ def test_a_plan_of_the_measured_rover_promises(speed_mps, clearance_m):
 
 
 def test_what_gf_action_does_is_said():
-    for action, words in ((0, "nothing stops"), (1, "only warns"), (3, "acts only when the rover is inside")):
+    for action, words in ((0, "nothing stops"), (1, "only warns"), (3, "acts only after a breach")):
         planned = plan(field(GF_ACTION=action), GoTo(target=at(0, 45), clearance_m=1.0))
         assert any(words in info for info in planned.info)
     assert any(

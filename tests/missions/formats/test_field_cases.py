@@ -528,7 +528,7 @@ def test_circles_are_sorted_by_outermost_too(tmp_path, radius_m):
     ("properties", "kind"),
     [
         *[({"name": name}, ZoneKind.EXCLUSION) for name in ("NO-FLY ZONE", "nofly", "Keep off", "Stay away!", "off limits", "Flugverbotszone", "restricted")],
-        *[({"name": name}, None) for name in ("Pond", "danger", "Schutzgebiet", "protected area", "no", "no crossing", "Field by the pond", "xyzzy", "Naturschutz")],
+        *[({"name": name}, None) for name in ("Pond", "danger", "Schutzgebiet", "protected area", "no", "no crossing", "Field by the pond", "xyzzy", "Naturschutz", "Area not to mow", "Zone: don't go", "field without me", "Wiese nicht", "Rasen: nicht zu mähen", "never", "lawn, not it")],
         *[({"name": name}, ZoneKind.INCLUSION) for name in ("North field", "Boundary", "A1", "", "Untitled Polygon", "zone 3", "Wiese 2")],
         ({"natural": "water"}, None),
         ({"building": "yes"}, None),

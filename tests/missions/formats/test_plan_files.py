@@ -334,7 +334,7 @@ def test_a_plan_says_for_which_vehicle_it_is_made(
 
 def test_a_mission_that_is_no_rovers_is_said() -> None:
     assert read(changed("mission.vehicleType", 2)).remarks == (
-        "f.plan is made for vehicle type 2 (vehicleType), not for a rover (10): its mission is taken for a rover's",
+        "f.plan is made for vehicle type 2 (vehicleType), not for a rover (10): its mission is read as a rover's",
     )
     document = changed("mission.vehicleType", 2)
     document["mission"]["items"] = []  # a fence is a fence

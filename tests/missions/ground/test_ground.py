@@ -325,7 +325,7 @@ def test_one_inclusion_and_the_home_circle_are_not_two_drawn_areas() -> None:
     beside = Point(one.frame.to_local(offset(HOME, 30, 0)))
     assert not is_allowed(one, 30, 0)
     assert not one.is_in_some_inclusions_only(beside)
-    with pytest.raises(FenceError, match="no area in common; set home inside the fence, or a greater radius"):
+    with pytest.raises(FenceError, match="no area in common; set home inside the fence, or a larger radius"):
         check_ground(ground(square(IN, 500, 0, 10), home=HOME, home_radius_m=50))
     with pytest.raises(FenceError, match="no area in common; the autopilot allows only the intersection"):
         check_ground(ground(square(IN, -40, 0, 10), square(IN, 40, 0, 10), home=HOME, home_radius_m=90))

@@ -119,7 +119,7 @@ def test_a_skid_steered_rover_is_not_sent_from_where_it_would_stand() -> None:
 
 @pytest.mark.parametrize("firmware", [Firmware(4, 5), None], ids=["4.5", "unknown"])
 def test_before_4_6_it_is_said_that_few_starts_were_measured(firmware: Firmware | None) -> None:
-    few = "only 4 of these starts were before ArduPilot 4.6"
+    few = "only 4 of these starts were measured before ArduPilot 4.6"
     for steering in ({}, SKID):
         with pytest.raises(StartBlockedError, match=few):
             route(9.0, firmware=firmware, **steering)

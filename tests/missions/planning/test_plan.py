@@ -532,6 +532,28 @@ class TestSnap:
         with pytest.raises(TargetBlockedError, match=r"the nearest free point is 3\.0\d m away"):
             drawn(situation_of(FIELD, WALL), place(50, 0), place(4, 0), snap_m=2.5)
 
+    def test_more_clearance_than_asked_moves_it_no_further(self) -> None:
+        """A route for more clearance may be quicker, but its target would be moved farther away than it has to be."""
+        bed = box(OUT, -20.3, -11.1, -6.8, 0.0)
+        situation = replace(
+            situation_of(box(IN, -67.7, -55.6, 67.7, 55.6), bed),
+            parameters={
+                "WP_SPEED": 2.0,
+                "WP_RADIUS": 1.0,
+                "TURN_RADIUS": 0.9,
+                "FENCE_MARGIN": 2.0,
+                "AVOID_ENABLE": 3.0,
+                "FENCE_ENABLE": 1.0,
+                "FENCE_TYPE": 4.0,
+            },
+        )
+        asked = place(-13.5, -5.56)
+        result = plan(
+            situation, Request(start=place(-54.2, -33.4), targets=[asked], clearance_m=2.5, snap_m=30.0)
+        )
+        # Out of the bed 5.54 m, and from it 2.5 m and the corridor beside straight legs.
+        assert 5.54 + 2.5 < length_m([asked, result.targets[0]]) < 5.54 + 2.5 + 0.5
+
     def test_to_ground_that_can_be_reached(self) -> None:
         """The nearest free point lies beyond a wall without a way round; one on this side is within reach too."""
         wall = box(OUT, -5, -110, 5, 110)

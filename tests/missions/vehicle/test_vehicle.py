@@ -497,7 +497,7 @@ PX4S, ARDUPILOTS = {"RO_SPEED_LIM": 3.0}, {"WP_SPEED": 2.0}
     [
         (None, {}, None, None, None),
         (None, {}, True, True, None),
-        (None, {}, False, False, "is taken for PX4, as f.plan says"),
+        (None, {}, False, False, "assuming PX4, as f.plan says"),
         (None, PX4S, False, False, None),
         (None, PX4S, True, False, "f.plan is made for ArduPilot (firmwareType), but the vehicle is PX4"),
         (

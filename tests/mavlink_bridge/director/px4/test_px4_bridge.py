@@ -223,7 +223,7 @@ def test_a_mission_that_the_vehicle_refuses_is_not_driven():
 
     vehicle.rover._judge_mission = refuse
     assert run.run(30) is State.FAILED
-    assert "PX4 does not take it for valid" in str(run.director.trouble)
+    assert "PX4 reports it as not valid" in str(run.director.trouble)
     assert "Geofence violation for waypoint 2" in str(run.director.trouble)
     assert not vehicle.is_armed
     assert run.modes_sent == []

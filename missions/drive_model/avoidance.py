@@ -21,17 +21,18 @@ import shapely
 
 from missions.drive_model.corner import GRAVITY_MPS2, INSIDE_BAND_M
 from missions.drive_model.fence_ahead import FenceAhead, FenceEdges
-from missions.drive_model.motion import all_travelled_m, profile_at
+from missions.drive_model.motion import all_travelled_m
 from missions.errors import VehicleError
 from missions.vehicle import Steering
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
     from shapely.geometry.base import BaseGeometry
 
     from missions.drive_model import Envelope
+    from missions.drive_model.legs_and_corners import DrivePlan
     from missions.vehicle import Vehicle
 
 LAG_RESERVE = 1.3
@@ -58,7 +59,7 @@ _ABOUT_CORNER_S = 7.0  # before and after a corner; chosen, not measured
 _SIDES = np.exp(1j * np.radians([0.0, ASIDE_DEG, -ASIDE_DEG]))
 
 
-def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | FenceEdges) -> Envelope:
+def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry) -> Envelope:
     """Return an envelope with the extra room that corners before a fence need where the vehicle's avoidance is on.
 
     Parameters
@@ -67,8 +68,8 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | Fence
         The drive without avoidance.
     vehicle : Vehicle
         What drives.
-    fence : shapely geometry or FenceEdges
-        The lines it avoids, metres; for many drives their edges, which are looked for once.
+    fence : shapely geometry
+        The lines it avoids, metres.
 
     Returns
     -------
@@ -77,23 +78,54 @@ def with_avoidance(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | Fence
     """
     if not vehicle.avoids_fence or not band.legs:
         return band
-    edges = fence if isinstance(fence, FenceEdges) else FenceEdges(fence)
-    if edges.is_empty:
+    middles_m = [
+        [corner.middle_m for corner in band.corners],
+        [corner.least_middle_m for corner in band.corners],
+    ]
+    found = ground_behind(band.points, band.motion, middles_m, vehicle, FenceEdges(fence))
+    if not found:
         return band
-    middles_m = {
-        tuple(corner.middle_m for corner in band.corners),
-        tuple(corner.least_middle_m for corner in band.corners),
-    }
-    found = [(band.cores, band.bands_m, band.waypoints)]
-    for either_m in sorted(middles_m):
-        target = TargetPoint(band, vehicle, either_m)
+    own = (band.cores, band.bands_m, band.waypoints)
+    cores, bands_m, waypoints = (np.concatenate(columns) for columns in zip(own, *found, strict=True))
+    return replace(band, cores=cores, bands_m=bands_m, waypoints=waypoints)
+
+
+def ground_behind(
+    points: NDArray[np.float64],
+    motion: DrivePlan,
+    middles_m: Iterable[Sequence[float]],
+    vehicle: Vehicle,
+    edges: FenceEdges,
+) -> list[Ground]:
+    """Return the ground that corners need besides the band where the vehicle's avoidance slows it.
+
+    Parameters
+    ----------
+    points : ndarray of float, shape (n, 2)
+        What is driven.
+    motion : DrivePlan
+        Its legs and corners.
+    middles_m : iterable of sequences of float
+        How far from each corner the middle of its cut lies along the legs, at the most and at the least.
+    vehicle : Vehicle
+        What drives.
+    edges : FenceEdges
+        Of the lines it avoids; for many drives they are looked for once.
+
+    Returns
+    -------
+    list of (ndarray, ndarray, ndarray)
+        Convex pieces, their bands and waypoints; empty where it falls behind nowhere.
+    """
+    if not vehicle.avoids_fence or not motion.legs or edges.is_empty:
+        return []
+    found = []
+    for either_m in sorted(set(map(tuple, middles_m))):
+        target = TargetPoint(points, motion, either_m)
         lags = target.lags(vehicle, FenceAhead(edges, _plane(target.places), vehicle))
         if lags and len((pieces := target.pieces(lags))[0]):
             found.append(pieces)
-    if len(found) == 1:
-        return band
-    cores, bands_m, waypoints = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    return replace(band, cores=cores, bands_m=bands_m, waypoints=waypoints)
+    return found
 
 
 class TargetPoint:
@@ -101,18 +133,17 @@ class TargetPoint:
 
     Parameters
     ----------
-    band : Envelope
-        The drive.
-    vehicle : Vehicle
-        Its limits.
+    points : ndarray of float, shape (n, 2)
+        What is driven.
+    motion : DrivePlan
+        Its legs and corners.
     middles_m : sequence of float
         How far from each corner the middle of its cut lies along the legs.
     """
 
-    def __init__(self, band: Envelope, vehicle: Vehicle, middles_m: Sequence[float]) -> None:
-        self.band = band
-        accel_mps2, jerk_mps3 = vehicle.accel_max_mps2, vehicle.jerk_mps3
-        profiles = [profile_at(leg.length_m, leg.top_speed_mps, accel_mps2, jerk_mps3) for leg in band.legs]
+    def __init__(self, points: NDArray[np.float64], motion: DrivePlan, middles_m: Sequence[float]) -> None:
+        self.motion = motion
+        profiles = [leg.profile for leg in motion.legs]
         begins_s = [0.0]
         self._passed_s = []
         """When it passes each corner."""
@@ -128,8 +159,8 @@ class TargetPoint:
                 duration_s=whole_s,
             )
         self.times_s = np.arange(0.0, whole_s + STEP_S, STEP_S)
-        points = band.points[:, 0] + 1j * band.points[:, 1]
-        self.places: NDArray[np.complex128] = np.full(len(self.times_s), points[0])
+        along = points[:, 0] + 1j * points[:, 1]
+        self.places: NDArray[np.complex128] = np.full(len(self.times_s), along[0])
         # Of each leg's own time, steps from its begin on, and its end.
         counts = [math.ceil(profile.duration_s / STEP_S) + 1 for profile in profiles]
         ends = np.cumsum(counts)
@@ -137,9 +168,9 @@ class TargetPoint:
         legs_s[ends - 1] = [profile.duration_s for profile in profiles]
         legs_m = all_travelled_m(profiles, counts, legs_s)
         for leg, profile, begin_s, count, end in zip(
-            band.legs, profiles, begins_s, counts, ends, strict=True
+            motion.legs, profiles, begins_s, counts, ends, strict=True
         ):
-            step = points[leg.first + 1] - points[leg.first]
+            step = along[leg.first + 1] - along[leg.first]
             leg_s, shares = legs_s[end - count : end], legs_m[end - count : end] / profile.length_m
             self.places += np.interp(self.times_s - begin_s, leg_s, shares) * step
 
@@ -166,20 +197,20 @@ class TargetPoint:
     def _near_corners(self) -> NDArray[np.bool_]:
         """Return which times lie near a corner: falling behind on a straight line does not matter."""
         near = np.zeros(len(self.times_s), dtype=np.bool_)
-        for corner, passed_s in zip(self.band.corners, self._passed_s, strict=True):
+        for corner, passed_s in zip(self.motion.corners, self._passed_s, strict=True):
             if not corner.stops and abs(corner.turn_deg) >= _LEAST_TURN_DEG:
                 near |= np.abs(self.times_s - passed_s) <= _ABOUT_CORNER_S
         return near
 
-    def pieces(
-        self, lags: list[complex]
-    ) -> tuple[NDArray[np.object_], NDArray[np.float64], NDArray[np.int64]]:
+    def pieces(self, lags: list[complex]) -> Ground:
         """Return the ground between target point and rover where the rover is behind, piece by piece, with its band and waypoint."""
         behind = np.array(lags)
         far = np.flatnonzero(np.abs(behind) >= NEGLIGIBLE_M)
         # A piece holds the first sample of the next one too.
-        whole, ends = far - far % _SAMPLES_A_PIECE, far[far % _SAMPLES_A_PIECE == 0] - _SAMPLES_A_PIECE
-        begins = np.union1d(whole, ends[ends >= 0])
+        is_far = np.zeros(len(behind) // _SAMPLES_A_PIECE + 1, dtype=np.bool_)
+        is_far[far // _SAMPLES_A_PIECE] = True
+        is_far[np.maximum(far - 1, 0) // _SAMPLES_A_PIECE] = True
+        begins = np.flatnonzero(is_far) * _SAMPLES_A_PIECE
         samples = np.minimum(begins[:, None] + np.arange(_SAMPLES_A_PIECE + 1), len(behind) - 1)
         targets = self.places[samples]
         ground = np.concatenate([targets, targets - LAG_RESERVE * behind[samples]], axis=1)
@@ -187,10 +218,14 @@ class TargetPoint:
         lines = shapely.linestrings(_plane(ground).reshape(*ground.shape, 2))
         cores = np.asarray(shapely.convex_hull(lines))
         passed_s, begins_s = np.array(self._passed_s), self.times_s[begins]
-        half_widths_m = np.array([leg.half_width_m for leg in self.band.legs])
+        half_widths_m = np.array([leg.band_m for leg in self.motion.legs])
         bands_m = np.minimum(half_widths_m[np.searchsorted(passed_s, begins_s)], INSIDE_BAND_M)
         nearest = np.abs(passed_s - begins_s[:, None]).argmin(axis=1)
-        return cores, bands_m, np.array([corner.waypoint for corner in self.band.corners])[nearest]
+        return cores, bands_m, np.array([corner.waypoint for corner in self.motion.corners])[nearest]
+
+
+Ground = tuple["NDArray[np.object_]", "NDArray[np.float64]", "NDArray[np.int64]"]
+"""Convex pieces, how far each is to be grown, and the waypoint that each belongs to."""
 
 
 def _plane(numbers: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -229,23 +264,20 @@ def _followed(
         here = places[sample] + (at - sample) * STEP_S * velocity - behind
         wanted = velocity + gain_per_s * behind
         wanted_mps = abs(wanted) or 1.0
-        most_mps = allowed_speed_mps(here, wanted / wanted_mps)
-        most_mps = min(most_mps, top_mps)
-        most_mps = min(most_mps, wanted_mps)
+        most_mps = min(allowed_speed_mps(here, wanted / wanted_mps), top_mps, wanted_mps)
         wanted *= most_mps / wanted_mps
         wanted_mps = abs(wanted)
         now_mps = abs(driven)
         heading = driven / now_mps if now_mps > _LEAST_MPS else wanted / (wanted_mps or 1.0)
         accel = (velocities[sample + 1] - velocity) / STEP_S
-        turn_radps = ((wanted + accel) * heading.conjugate()).imag / (max(1.0, now_mps))
+        turn_radps = ((wanted + accel) * heading.conjugate()).imag / max(1.0, now_mps)
         if is_steered:
             most_radps = now_mps / turn_radius_m
             turn_radps = min(max(turn_radps, -most_radps), most_radps)
         heading *= cmath.rect(1.0, turn_radps * STEP_S)
         driven = heading * max(min(wanted_mps, turn_mps), (wanted * heading.conjugate()).real, 0.0)
         # How fast time runs for the target point: it waits for a rover that cannot keep up (AR_WPNav). 0.05 as in the simulator's `drive`.
-        target_mps = abs(velocity)
-        target_mps = max(target_mps, _LEAST_MPS)
+        target_mps = max(abs(velocity), _LEAST_MPS)
         along_mps = ((driven - gain_per_s * behind) * velocity.conjugate()).real / target_mps
         runs = min(max(0.05 + along_mps / target_mps, _LEAST_SCALE), 1.0)
         scale += (runs - scale) * STEP_S / _SETTLE_S

@@ -21,11 +21,19 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from missions.drive_model.motion import LegProfile
     from missions.geo import Vector
     from missions.vehicle import Vehicle
 
 SAME_PLACE_M = 0.3
 """Points nearer to one another are one place for a rover: it can make nothing of a leg between them but a stop."""
+
+
+KnownCorners = dict[tuple[object, ...], CornerPlan]
+"""Corners of one vehicle by what decides on them, without their places: of many drives that differ little most have the same."""
+
+MOST_KNOWN = 20_000
+"""Corners that are kept, about 1 kB each; of more it begins anew."""
 
 
 def drive_plan(
@@ -34,8 +42,10 @@ def drive_plan(
     speeds: Sequence[float | None] | None,
     stops: Mapping[int, float],
     start: Stray,
+    known: KnownCorners | None = None,
 ) -> DrivePlan:
     """Return the legs and corners of a list of points; points that lie on one another are one place, and a stop."""
+    known = {} if known is None else known
     groups = _grouped(points)
     legs = tuple(
         _leg(vehicle, before, after, None if speeds is None else speeds[after[0][0] - 1])
@@ -57,10 +67,13 @@ def drive_plan(
         changes_speed = asked[number] != asked[number + 1] and abs(turn_deg) > at_corner.STRAIGHT_ON_DEG
         fastest_mps = max(asked_mps[number], asked_mps[number + 1])
         bend = Bend(turn_deg, whole_deg, min(runs_m[number], runs_m[number + 1]), fastest_mps, changes_speed)
-        corner = _corner(vehicle, group, (before, after), bend, stops)
+        stops_s = [stops[number] for number, _ in group if number in stops] if stops else []
+        corner = _known_corner(known, vehicle, (before.profile, after.profile), bend, len(group), stops_s)
         goes_on = abs(turn_deg) < at_corner.STRAIGHT_ON_DEG
         more_m = 0.0 if goes_on else at_corner.unsettled_m(vehicle, swung_m, runs_m[number])
-        corner = corner._replace(stray_m=max(corner.stray_m, more_m))
+        places = tuple([place for _, place in group])
+        stray_m = max(corner.stray_m, more_m)
+        corner = corner._replace(waypoint=group[-1][0], places=places, stray_m=stray_m)
         start_more_m = more_m if is_first_run and not goes_on else start_more_m
         if corner.stops or not goes_on:
             is_first_run = False
@@ -133,20 +146,37 @@ def _runs_m(legs: Sequence[LegPlan], turns_deg: Sequence[float]) -> list[float]:
     return [length_m for length_m, run in zip(lengths_m, runs, strict=True) for _ in run]
 
 
+def _known_corner(
+    known: KnownCorners,
+    vehicle: Vehicle,
+    profiles: tuple[LegProfile, LegProfile],
+    bend: Bend,
+    places: int,
+    stops_s: list[float],
+) -> CornerPlan:
+    """Return a corner, without its places, from those known if it is one of them."""
+    key = (*profiles, bend, places, *stops_s)
+    corner = known.get(key)
+    if corner is None:
+        if len(known) >= MOST_KNOWN:
+            known.clear()
+        corner = known[key] = _corner(vehicle, profiles, bend, places, stops_s)
+    return corner
+
+
 def _corner(
     vehicle: Vehicle,
-    group: list[tuple[int, Vector]],
-    legs: tuple[LegPlan, LegPlan],
+    profiles: tuple[LegProfile, LegProfile],
     bend: Bend,
-    stops: Mapping[int, float],
+    places: int,
+    stops_s: list[float],
 ) -> CornerPlan:
     # Long: one decision on how a corner is driven, and what follows from it field by field.
-    before, after = legs
+    before, after = profiles
     turn_deg = bend.turn_deg
     pivots = at_corner.pivots(vehicle, turn_deg)
-    stops_s = [stops[number] for number, _ in group if number in stops] if stops else []
     delay_s = sum(stops_s, 0.0)
-    stopped = len(group) > 1 or bool(stops_s)
+    stopped = places > 1 or bool(stops_s)
     doubtful = at_corner.may_pivot_or_cut(vehicle, turn_deg) and not stopped
     tail = Stray()
     either_m = 0.0
@@ -159,7 +189,7 @@ def _corner(
         swing_m = at_corner.start_swing_m(vehicle, turn_deg)
         behind_m = at_corner.start_behind_m(vehicle, turn_deg)
     else:
-        blend = at_corner.blend(vehicle, before.profile, after.profile, turn_deg)
+        blend = at_corner.blend(vehicle, before, after, turn_deg)
         swing_m = at_corner.corner_swing_m(vehicle, bend, blend.reach_m)
         behind_m = swing_m * at_corner.behind_share(turn_deg)
         if vehicle.pursuit is not None and abs(turn_deg) > at_pursuit.EITHER_SIDE_DEG:
@@ -172,8 +202,8 @@ def _corner(
     more = corner_more(vehicle, turn_deg, bend.speed_mps, stands=stopped or pivots)
     holds_s = at_corner.swing_hold_s(vehicle, swing_m, stopped=stopped, pivots=pivots)
     swing_m = max(0.0, swing_m + min(more.outside_m, 0.0))
-    top_mps = min(before.profile.top_speed_mps, after.profile.top_speed_mps)
-    ramps_s = (before.profile.ramp.duration_s + after.profile.ramp.duration_s) / 2
+    top_mps = min(before.top_speed_mps, after.top_speed_mps)
+    ramps_s = (before.ramp.duration_s + after.ramp.duration_s) / 2
     lost_s = ramps_s - blend.duration_s + at_corner.swing_time_s(swing_m, top_mps) + delay_s
     if vehicle.pursuit is not None and not stopped:
         lost_s += at_pursuit.time_lost_s(vehicle, vehicle.pursuit, turn_deg, top_mps)
@@ -182,8 +212,8 @@ def _corner(
     if pivots:
         lost_s += at_corner.pivot_time_s(vehicle, turn_deg)
     return CornerPlan(
-        waypoint=group[-1][0],
-        places=tuple(place for _, place in group),
+        waypoint=0,
+        places=(),
         turn_deg=turn_deg,
         stops=stopped or pivots,
         pivots=pivots,
@@ -194,7 +224,7 @@ def _corner(
         swing_m=swing_m,
         behind_m=behind_m,
         swings_until_s=blend.duration_s / 2 + holds_s,
-        stray_m=max(_stray_m(len(group), delay_s), either_m),
+        stray_m=max(_stray_m(places, delay_s), either_m),
         tail=tail,
         time_lost_s=lost_s,
         more=more,

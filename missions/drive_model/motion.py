@@ -7,6 +7,7 @@ last one has ended (SCurve.cpp). The short smoothing of the jerk itself (a snap 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -162,6 +163,7 @@ def all_travelled_m(
     return np.asarray(np.where(is_late, length_m - away_m, away_m))
 
 
+@lru_cache(maxsize=4096)  # most of the lines that are tried have most legs in common
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
     """Return the motion along a leg: to the speed asked for, or as fast as half its length allows."""
     lag_s = accel_mps2 / jerk_mps3

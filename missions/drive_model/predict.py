@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from missions.drive_model.envelope import Corner
+    from missions.drive_model.from_points import KnownCorners
     from missions.drive_model.legs_and_corners import DrivePlan
     from missions.vehicle import Vehicle
 
@@ -74,16 +75,23 @@ def plan_drive(
     heading_deg: float | None = None,
     speeds: Sequence[float | None] | None = None,
     stops: Mapping[int, float] | None = None,
+    known: dict[int, KnownCorners] | None = None,
 ) -> Drive:
-    """Predict a drive step by step: first its time, and only if need be its band; see `envelope`."""
+    """Predict a drive step by step: first its time, and only if need be its band; see `envelope`.
+
+    What becomes known of the vehicle's corners, as one or as the other it may be, serves its other drives.
+    """
     array = _checked(points)
     _check_speeds(speeds, len(array) - 1)
     starts = [_start(array, vehicle, heading_deg)]
     if heading_deg is None and len(array) > 1:
         # Starting straight on it is sooner at speed, and then strays further from short legs than after the worst start.
         starts.append(_start(array, vehicle, _bearing_deg(array)))
-    ways = tuple((known, *start) for known in _of_known_corners(vehicle) for start in starts)
-    return Drive(array, ways, speeds, stops or {})
+    ways, corners = [], []
+    for number, one in enumerate(_of_known_corners(vehicle)):
+        ways += [(one, *start) for start in starts]
+        corners += [{} if known is None else known.setdefault(number, {})] * len(starts)
+    return Drive(array, tuple(ways), speeds, stops or {}, tuple(corners))
 
 
 def _of_known_corners(vehicle: Vehicle) -> Sequence[Vehicle]:
@@ -113,25 +121,35 @@ class Drive:
         The speed asked for on each leg.
     stops : mapping of int to float
         Where it stops, and for how many seconds.
+    known : tuple of dict
+        What is known of the corners of each way.
     """
 
     points: NDArray[np.float64]
     ways: tuple[tuple[Vehicle, Stray, float], ...]
     speeds: Sequence[float | None] | None
     stops: Mapping[int, float]
+    known: tuple[KnownCorners, ...]
     _plans: dict[int, DrivePlan] = field(default_factory=dict, init=False)
 
     def plan(self, way: int) -> DrivePlan:
         """Return the legs and corners of one way."""
         if way not in self._plans:
             vehicle, stray, _ = self.ways[way]
-            self._plans[way] = drive_plan(self.points, vehicle, self.speeds, self.stops, stray)
+            corners = self.known[way]
+            self._plans[way] = drive_plan(self.points, vehicle, self.speeds, self.stops, stray, corners)
         return self._plans[way]
 
     @property
     def plans(self) -> tuple[DrivePlan, ...]:
         """The legs and corners of each way."""
         return tuple(map(self.plan, range(len(self.ways))))
+
+    @property
+    def middles_m(self) -> tuple[list[float], list[float]]:
+        """How far from each corner the middle of its cut lies along the legs, at the most and at the least."""
+        ways = [[corner.blend.reach_m for corner in plan.corners] for plan in self.plans]
+        return list(map(max, ways[0], *ways)), list(map(min, ways[0], *ways))
 
     @cached_property
     def arrivals_s(self) -> NDArray[np.float64]:
@@ -149,19 +167,12 @@ class Drive:
     def envelope(self) -> Envelope:
         """The band, with the predictions for corners and legs."""
         pieces = self.pieces(*range(len(self.ways)))
-        bands_m, waypoints = np.array(pieces.bands_m), np.array(pieces.waypoints, dtype=np.int64)
-        return self.with_cores(pieces.convex(), bands_m, waypoints)
-
-    def with_cores(
-        self, cores: NDArray[np.object_], bands_m: NDArray[np.float64], waypoints: NDArray[np.int64]
-    ) -> Envelope:
-        """Return the band from the convex hulls of its pieces of all ways, already known."""
         plan = self.plan(0)
         return Envelope(
             points=self.points,
-            cores=cores,
-            bands_m=bands_m,
-            waypoints=waypoints,
+            cores=pieces.convex(),
+            bands_m=np.array(pieces.bands_m),
+            waypoints=np.array(pieces.waypoints, dtype=np.int64),
             corners=tuple(told_corner(self.plans, number) for number in range(len(plan.corners))),
             legs=tuple(told_leg(self.plans, number) for number in range(len(plan.legs))),
             arrivals_s=self.arrivals_s,

@@ -180,7 +180,7 @@ def motion(band: Envelope, vehicle: Vehicle, fence: BaseGeometry | None = None) 
         return None
     if vehicle.pursuit is not None:
         return _at_cruise(band)
-    target = TargetPoint(band, vehicle, [corner.middle_m for corner in band.corners])
+    target = TargetPoint(band.points, band.motion, [corner.middle_m for corner in band.corners])
     places = target.places.view(np.float64).reshape(-1, 2)
     every = 1 + (len(places) - 2) // _MOST_SAMPLES
     steps = np.diff(places, axis=0)[::every]

@@ -14,28 +14,29 @@ candidates of a search. What is promised does not rest on them: `is_enough` asks
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
 from missions.drive_model import plan_drive
-from missions.drive_model.avoidance import with_avoidance
+from missions.drive_model.avoidance import ground_behind
 from missions.drive_model.fence_ahead import FenceEdges
 from missions.fitting import moves
 from missions.fitting import polyline as drawn
 from missions.geo import LocalPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
     from missions.drive_model import Drive
+    from missions.drive_model.from_points import KnownCorners
     from missions.fitting.polyline import Drawing
     from missions.ground.ground import Ground
     from missions.vehicle import Vehicle
@@ -130,6 +131,10 @@ class Gauge:
             trial = self._trials[key] = Trial(self._surroundings, *key)
         return trial
 
+    def look_at_legs(self, parts: Iterable[Drawing]) -> None:
+        """Measure the drawn legs of parts of lines, at once, which takes less than one part after another."""
+        self._surroundings.look_at(itertools.chain.from_iterable(map(drawn.legs, parts)))
+
     def measure(self, drawing: Drawing) -> Measured:
         """Measure whole lines."""
         return self.trial(drawing, 0, len(drawing)).measured()
@@ -148,6 +153,7 @@ class Surroundings:
     def __init__(self, ground: Ground, vehicle: Vehicle, heading_deg: float | None) -> None:
         self.ground, self.vehicle = ground, vehicle
         self.edges = FenceEdges(ground.avoided_edge)
+        self.corners: dict[int, KnownCorners] = {}
         self._heading_deg = heading_deg
         self._legs_m: dict[tuple[LocalPoint, LocalPoint], float] = {}
 
@@ -160,11 +166,17 @@ class Surroundings:
 
     def legs_m(self, part: Drawing) -> list[float]:
         """Return the distance of each drawn leg from the fence."""
-        legs = [(a.place, b.place) for a, b in pairwise(part)]
-        new = [leg for leg in legs if leg not in self._legs_m]
-        if new:
-            self._legs_m |= zip(new, self.distances_m(shapely.linestrings(new)).tolist(), strict=True)
+        legs = drawn.legs(part)
+        self.look_at(legs)
         return [self._legs_m[leg] for leg in legs]
+
+    def look_at(self, legs: Iterable[tuple[LocalPoint, LocalPoint]]) -> None:
+        """Measure those of some drawn legs that are not known."""
+        known = self._legs_m
+        new = list(dict.fromkeys(leg for leg in legs if leg not in known))
+        if new:
+            lines = np.asarray(shapely.linestrings(np.array(new)))
+            known |= zip(new, self.distances_m(lines).tolist(), strict=True)
 
     def distances_m(self, shapes: NDArray[np.object_]) -> NDArray[np.float64]:
         """Return the distance of shapes from the fence; infinite without one."""
@@ -247,7 +259,7 @@ class Trial:
     @property
     def missing_in_all_m(self) -> float:
         """All together of what is missing at the points."""
-        return float(self.missing_m.sum())
+        return float(np.add.reduce(self.missing_m))
 
     def finish(self) -> Trial:
         """Take all steps."""
@@ -280,6 +292,7 @@ class Trial:
             heading_deg=self._surroundings.part_heading_deg(part, is_first=self._is_first),
             speeds=drawn.speeds(part),
             stops=drawn.stops(part),
+            known=self._surroundings.corners,
         )
         self._duration_s = float(self._drive.arrivals_s[-1])
         # Of an unknown firmware the older one's band comes last here, so first there: it is mostly the wider.
@@ -313,12 +326,15 @@ class Trial:
         around = self._surroundings
         if (self._required_m[self._waypoints] - self._clearances_m).max() >= _FAR_FROM_ENOUGH_M:
             return
-        band = self._drive.with_cores(self._cores, self._bands_m, self._waypoints)
-        slowed = with_avoidance(band, around.vehicle, around.edges)
-        if slowed is not band:
+        drive = self._drive
+        behind = ground_behind(drive.points, drive.plan(0), drive.middles_m, around.vehicle, around.edges)
+        if behind:
             plain = len(self._cores)
-            more_m = around.distances_m(slowed.cores[plain:]) - slowed.bands_m[plain:]
-            self._cores, self._bands_m, self._waypoints = slowed.cores, slowed.bands_m, slowed.waypoints
+            own = (self._cores, self._bands_m, self._waypoints)
+            self._cores, self._bands_m, self._waypoints = (
+                np.concatenate(column) for column in zip(own, *behind, strict=True)
+            )
+            more_m = around.distances_m(self._cores[plain:]) - self._bands_m[plain:]
             self._clearances_m = np.concatenate([self._clearances_m, more_m])
             self._steps.append(partial(Trial._dive, begin=plain))
             self._settle()
@@ -344,7 +360,7 @@ class Trial:
         if not self._is_last:
             missing_m[-1] = 0.0
         self.missing_m = missing_m
-        self.may_be_enough = bool(missing_m.max() <= ENOUGH_M)
+        self.may_be_enough = bool(np.maximum.reduce(missing_m) <= ENOUGH_M)
         self._add_up()
 
     def _add_up(self) -> None:

@@ -12,7 +12,7 @@ makes the band worse, so a descent stops there.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import shapely
@@ -131,7 +131,7 @@ def straight_through(drawing: Drawing, index: int, gap: Gap) -> Iterator[Drawing
                 first -= 1
             while gives_way(last, before_m, behind_m):
                 last += 1
-            point = replace(drawing[last], is_fixed=False, stop_s=None)
+            point = drawing[last]._replace(is_fixed=False, stop_s=None)
             ends = (
                 point.at(shifted(gap.middle, gap.through, -before_m)),
                 point.at(shifted(gap.middle, gap.through, behind_m)),

@@ -306,8 +306,7 @@ class Fitting:
         trials: list[_Tried] = []
         known: dict[tuple[int, int], Trial] = {}
         solved_at = None
-        for number, candidate in enumerate(candidates):
-            begin, kept = _changed(drawing, candidate)
+        for number, (candidate, begin, kept) in enumerate(self._looked_at(drawing, candidates)):
             span = (begin, len(drawing) - kept)
             if span not in known:
                 self.measurements += 1
@@ -329,6 +328,16 @@ class Fitting:
             if found.cost_s < measured.cost_s - _LEAST_GAIN_S and more_m <= ENOUGH_M:
                 return tried.drawing, found
         return None
+
+    def _looked_at(
+        self, drawing: Drawing, candidates: Iterable[Drawing]
+    ) -> Iterator[tuple[Drawing, int, int]]:
+        """Return candidates with where they differ from lines (`_changed`); the legs of several are measured at once."""
+        waiting = iter(candidates)
+        while some := tuple(itertools.islice(waiting, _MORE_TRIES + 1)):
+            changed = [(candidate, *_changed(drawing, candidate)) for candidate in some]
+            self.gauge.look_at_legs(lines[begin : len(lines) - kept] for lines, begin, kept in changed)
+            yield from changed
 
     def _is_over(self) -> bool:
         stop = self.should_stop is not None and self.should_stop()
@@ -410,6 +419,11 @@ def _best_first(trials: Iterable[_Tried]) -> Iterator[_Tried]:
 def _changed(old: Drawing, new: Drawing) -> tuple[int, int]:
     """Return where the part begins in which two lines differ, some points before, and how many points after it are the same."""
     shorter = min(len(old), len(new))
-    same = next((i for i in range(shorter) if old[i] != new[i]), shorter)
-    rest = next((i for i in range(shorter - same) if old[-1 - i] != new[-1 - i]), shorter - same)
+    # Mostly they are the very same points, which takes less to see than that they are equal.
+    same = 0
+    while same < shorter and (old[same] is new[same] or old[same] == new[same]):
+        same += 1
+    rest, most = 0, shorter - same
+    while rest < most and (old[-1 - rest] is new[-1 - rest] or old[-1 - rest] == new[-1 - rest]):
+        rest += 1
     return max(0, same - _CONTEXT), max(0, rest - _CONTEXT)

@@ -19,7 +19,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
 from missions.fitting import polyline as drawn
 from missions.fitting.polyline import Drawing, shifted
@@ -190,7 +189,7 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
     faster = [None, *(other for other in SLOW_MPS if slow_mps < other < speed_mps)]
     is_first = drawing[index - 1].speed_mps != slow_mps or index == 1
     for quick_mps in faster:
-        quick = [replace(point, speed_mps=quick_mps) for point in drawing]
+        quick = [point._replace(speed_mps=quick_mps) for point in drawing]
         if is_first and end > index + 1:
             yield (*drawing[:index], *quick[index:end], *drawing[end:])
         yield (*drawing[:index], quick[index], *drawing[index + 1 :])
@@ -200,7 +199,7 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
         if length_m - after_m - before_m < APART_M:
             continue
         points = [
-            replace(drawing[index].at(place), is_fixed=False, stop_s=None)
+            drawing[index].at(place)._replace(is_fixed=False, stop_s=None)
             for place in (
                 shifted(drawing[index - 1].place, ahead, after_m),
                 shifted(drawing[index].place, ahead, -before_m),
@@ -210,7 +209,7 @@ def quickened(drawing: Drawing, index: int, speed_mps: float) -> Iterator[Drawin
             if after_m or before_m:
                 slow = points[:1] if after_m else []
                 last, rest = (points[1], index) if before_m else (drawing[index], index + 1)
-                yield (*drawing[:index], *slow, replace(last, speed_mps=quick_mps), *drawing[rest:])
+                yield (*drawing[:index], *slow, last._replace(speed_mps=quick_mps), *drawing[rest:])
 
 
 def split(drawing: Drawing, index: int, spacings_m: tuple[float, ...] = SPACINGS_M) -> Iterator[Drawing]:
@@ -285,7 +284,7 @@ def crawling(drawing: Drawing, spots: list[LocalPoint], speed_mps: float) -> Dra
 def stopped(drawing: Drawing, index: int) -> Iterator[Drawing]:
     """Stop at a corner (for rovers that turn on the spot)."""
     if 0 < index < len(drawing) - 1:
-        yield (*drawing[:index], replace(drawing[index], stop_s=STOP_S), *drawing[index + 1 :])
+        yield (*drawing[:index], drawing[index]._replace(stop_s=STOP_S), *drawing[index + 1 :])
 
 
 def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
@@ -294,7 +293,7 @@ def headed(drawing: Drawing, heading_deg: float) -> Iterator[Drawing]:
     for length_m in HEAD_M:
         for side_deg in SIDE_DEG:
             first = start.at(shifted(start.place, heading_vector(heading_deg + side_deg), length_m))
-            first = replace(first, is_fixed=False)
+            first = first._replace(is_fixed=False)
             yield (start, first, *drawing[1:])
             if side_deg:
                 # Chosen: on round to the same side, to come back to the route behind.
@@ -310,7 +309,7 @@ def approached(drawing: Drawing, index: int) -> Iterator[Drawing]:
     for number in range(APPROACHES):
         way = heading_vector(360.0 * number / APPROACHES)
         for length_m in APPROACH_M:
-            point = replace(here.at(shifted(here.place, way, length_m)), is_fixed=False, stop_s=None)
+            point = here.at(shifted(here.place, way, length_m))._replace(is_fixed=False, stop_s=None)
             if index:
                 yield (*drawing[:index], point, *drawing[index:])
             if index < len(drawing) - 1:
@@ -346,7 +345,7 @@ def _with_change(drawing: Drawing, along_m: float, way: float) -> tuple[Drawing,
 
 
 def _slower(point: drawn.DrawnPoint, speed_mps: float) -> drawn.DrawnPoint:
-    return replace(point, speed_mps=speed_mps if point.speed_mps is None else min(speed_mps, point.speed_mps))
+    return point._replace(speed_mps=speed_mps if point.speed_mps is None else min(speed_mps, point.speed_mps))
 
 
 def _along_m(drawing: Drawing, along: list[float], place: LocalPoint, index: int) -> float:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,9 +18,8 @@ if TYPE_CHECKING:
     from missions.geo import Vector
 
 
-@dataclass(frozen=True, slots=True)
-class DrawnPoint:
-    """One point of the lines.
+class DrawnPoint(NamedTuple):
+    """One point of the lines; a tuple, because hundreds of thousands are made and compared for one plan.
 
     Parameters
     ----------
@@ -48,7 +46,7 @@ class DrawnPoint:
 
     def at(self, place: LocalPoint) -> DrawnPoint:
         """Return the point at another place."""
-        return replace(self, place=place)
+        return DrawnPoint(place, *self[1:])
 
 
 Drawing = tuple[DrawnPoint, ...]
@@ -62,6 +60,11 @@ def is_end_or_fixed(drawing: Sequence[DrawnPoint], index: int) -> bool:
 def places(drawing: Sequence[DrawnPoint]) -> NDArray[np.float64]:
     """Return the points' places, (n, 2)."""
     return np.array([point.place for point in drawing])
+
+
+def legs(drawing: Sequence[DrawnPoint]) -> list[tuple[LocalPoint, LocalPoint]]:
+    """Return the ends of each leg."""
+    return [(a.place, b.place) for a, b in pairwise(drawing)]
 
 
 def speeds(drawing: Sequence[DrawnPoint]) -> list[float | None]:
@@ -139,5 +142,5 @@ def with_point_at(drawing: Drawing, along_m: float, near_m: float) -> tuple[Draw
     if abs(along[nearest] - along_m) <= near_m:
         return drawing, nearest
     after = next(number for number, there_m in enumerate(along) if there_m > along_m)
-    new = replace(drawing[after].at(place_at(drawing, along_m)), stop_s=None, is_fixed=False)
+    new = drawing[after].at(place_at(drawing, along_m))._replace(stop_s=None, is_fixed=False)
     return (*drawing[:after], new, *drawing[after:]), after

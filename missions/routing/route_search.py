@@ -265,8 +265,7 @@ class RouteSearch:
             not number or (number <= leads and not point.is_fixed) for number, point in enumerate(drawing)
         ]
         return tuple(
-            replace(
-                point,
+            point._replace(
                 required_m=near_m if is_near else required_m,
                 line_m=line_m if is_near else required_m,
             )
@@ -398,7 +397,7 @@ class RouteSearch:
         return self.known.drawn[clearance_m]
 
     def _fit(self, fitting: Fitting, route: Route, speed_mps: float | None = None) -> _Attempt:
-        drawn_lines = tuple(replace(point, speed_mps=speed_mps) for point in self._drawing(route))
+        drawn_lines = tuple(point._replace(speed_mps=speed_mps) for point in self._drawing(route))
         key = (drawn_lines, fitting.measurements, fitting.most_measurements, fitting.good_share)
         if key not in self.known.fitted:
             fitted = fitting.fit(drawn_lines)
@@ -450,8 +449,7 @@ class RouteSearch:
         if missed_at_start_m > _MISSED_AT_START_M or missed_m >= self.required_m:
             return None
         drawing = tuple(
-            replace(
-                point,
+            point._replace(
                 required_m=point.required_m - (missed_m if number >= first else missed_at_start_m),
                 line_m=point.line_m
                 - (missed_m if number >= first else min(missed_at_start_m, _LINE_SLACK_M)),

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point, Polygon
 
-from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope
+from missions.drive_model import Corner, Envelope, beyond_measured, corner_forecast, envelope, plan_drive
 from missions.drive_model.corner import END_OVERRUN_M, blend
 from missions.drive_model.motion import LegProfile, all_travelled_m, leg_profile
 from missions.errors import InvalidPositionError, VehicleError
@@ -66,6 +66,28 @@ routes = st.integers(1, 7).flatmap(
         st.floats(-180, 180).map(_to_microdegrees),
     )
 )
+
+
+@settings(max_examples=30)
+@given(first=routes, second=routes, heading_deg=st.sampled_from([None, 0.0, 170.0]))
+def test_what_is_known_of_corners_changes_no_other_drive(
+    first: np.ndarray, second: np.ndarray, heading_deg: float | None
+) -> None:
+    rover = replace(SLOW_ROVER, has_measured_corners=None)
+    known: dict[int, dict] = {}
+    drives = [
+        (first, None),
+        (np.vstack([first, second + first[-1]]), heading_deg),
+        (first + 7.0, None),
+        (first, 0.0),
+    ]
+    for points, faces_deg in drives:
+        for stops in ({}, {1: 2.0}):
+            own = plan_drive(points, rover, heading_deg=faces_deg, stops=stops)
+            shared = plan_drive(points, rover, heading_deg=faces_deg, stops=stops, known=known)
+            assert [plan.corners for plan in shared.plans] == [plan.corners for plan in own.plans]
+            assert shared.arrivals_s.tolist() == own.arrivals_s.tolist()
+    assert set(known) == {0, 1}
 
 
 # --- measured on ArduPilot Rover -------------------------------------------------------------------------------------------

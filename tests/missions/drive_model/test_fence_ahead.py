@@ -102,8 +102,8 @@ def test_rays_that_pass_all_edges_by_are_left_out_and_no_others(seed: int, far_m
     fence = shapely.union_all([ring(int(rng.integers(3, 30)), 4.0, far_m + x, 3.0) for x in (-9.0, 0.0, 9.0)])
     places = np.array((far_m, 0.0)) + rng.uniform(-20.0, 20.0, (60, 2))
     edges = FenceEdges(fence)
-    aimed = rng.integers(0, len(edges.starts), 60)
-    at = edges.starts[aimed] + rng.choice([1e-6, 0.3, 1.0 - 1e-6], 60) * edges.steps[aimed]
+    aimed = rng.integers(0, len(edges.boxed.starts), 60)
+    at = edges.boxed.starts[aimed] + rng.choice([1e-6, 0.3, 1.0 - 1e-6], 60) * edges.boxed.steps[aimed]
     ways = np.column_stack((at.real, at.imag)) - places
     ways /= np.hypot(*ways.T)[:, None]
     ahead = FenceAhead(edges, places, vehicle)

@@ -41,7 +41,7 @@ def gauge_of(*zones, heading_deg: float | None = 0.0, **parameters: float) -> Ga
 
 def lines(*places: tuple[float, float], required_m: float = 2.0) -> Drawing:
     points = [DrawnPoint(LocalPoint(*place), required_m, required_m) for place in places]
-    return tuple(replace(point, is_fixed=at in (0, len(points) - 1)) for at, point in enumerate(points))
+    return tuple(point._replace(is_fixed=at in (0, len(points) - 1)) for at, point in enumerate(points))
 
 
 ways = st.lists(

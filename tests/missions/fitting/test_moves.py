@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -159,7 +158,7 @@ def test_a_fixed_point_is_approached_from_other_sides_and_stays() -> None:
 
 
 def replace_stop(drawing: Drawing) -> Drawing:
-    return (drawing[0], replace(drawing[1], stop_s=2.0), drawing[2])
+    return (drawing[0], drawing[1]._replace(stop_s=2.0), drawing[2])
 
 
 def test_a_leg_is_bent_away_from_a_fence() -> None:
@@ -183,7 +182,7 @@ def test_fixed_points_are_not_rejoined() -> None:
 
 
 def test_a_slow_stretch_is_driven_faster_whole_or_in_part() -> None:
-    slow = tuple(replace(point, speed_mps=1.0) for point in RIGHT_ANGLE)
+    slow = tuple(point._replace(speed_mps=1.0) for point in RIGHT_ANGLE)
     found = list(moves.quickened(slow, 1, 5.0))
     speeds = {tuple(drawn.speeds(one)) for one in found}
     assert {(None, None), (None, 1.0), (3.0, 3.0), (1.0, None, 1.0, 1.0), (1.0, 2.0, 1.0)} <= speeds
@@ -194,5 +193,5 @@ def test_a_slow_stretch_is_driven_faster_whole_or_in_part() -> None:
 
 def test_what_is_not_slow_is_not_quickened() -> None:
     assert not list(moves.quickened(RIGHT_ANGLE, 1, 5.0))
-    slowest = tuple(replace(point, speed_mps=2.0) for point in RIGHT_ANGLE)
+    slowest = tuple(point._replace(speed_mps=2.0) for point in RIGHT_ANGLE)
     assert all(one[1].speed_mps != 3.0 for one in moves.quickened(slowest, 1, 3.0))

@@ -147,7 +147,7 @@ const en = {
   },
   noRoute: {
     title: "No route", here: "here", widest: /** @param {number} value */ (value) => `The widest route there is keeps ${m(value)} (dashed: its straight legs).`, take: /** @param {number} value */ (value) => `Ask for ${m(value)} instead`,
-    widestDrawn: /** @param {number} value */ (value) => `Along its straight legs (dashed) the widest route keeps ${m(value)}; a rover that drives it keeps less.`, takeWidest: "Plan the widest route",
+    widestDrawn: "Dashed: the straight legs of the widest route. A rover that drives it keeps less.", takeWidest: "Plan the widest route",
     between: /** @param {string[]} names */ (names) => `It is narrowest ${names.length > 1 ? "between" : "at"} ${names.join(" and ")}.`,
     blockers: "In the way (thick lines)", none: "No route at all, however narrow.",
   },

@@ -105,7 +105,7 @@ def test_no_route_is_explained_and_the_widest_is_taken_by_a_button(watched: Watc
     page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("8")
     page.keyboard.press("Enter")
     expect(page.locator(".headline")).to_have_text("✗ No route")
-    expect(page.locator("#outcome .card.bad")).to_contain_text("the widest route keeps")
+    expect(page.locator("#outcome .card.bad")).to_contain_text("along straight legs the widest keeps")
     expect(page.locator("#outcome .card.bad")).to_contain_text("In the way")
     assert watched.accessible() == []
     page.get_by_role("button", name="Plan the widest route").click()

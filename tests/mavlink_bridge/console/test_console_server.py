@@ -133,6 +133,24 @@ def test_too_much_clearance_is_refused_without_looking_for_the_widest_that_can_b
         assert "along straight legs" in why["message"]
 
 
+def test_planning_that_takes_a_while_is_cancelled_in_the_midst_of_it(console):
+    hub, address, client = console
+    answers: list[httpx.Response] = []
+
+    def plan() -> None:
+        with httpx.Client(base_url=f"http://{address}", timeout=60) as page:
+            answers.append(page.post("/api/plan", json=asked(clearance_m=None, widest=True), headers=PAGE))
+
+    thread = threading.Thread(target=plan)
+    thread.start()
+    until_s = time.monotonic() + 100
+    while not hub.jobs._newest and time.monotonic() < until_s:
+        time.sleep(0.002)
+    assert client.post("/api/plan/cancel", json={}, headers=PAGE).status_code == 200
+    thread.join(100)
+    assert (answers[0].status_code, answers[0].json()["error"]["kind"]) == (409, "superseded")
+
+
 def test_a_dragged_way_point_breaks_the_promise_at_once(client):
     route = client.post("/api/plan", json=asked()).json()
     points = [point["at"] for point in route["points"][1:]]

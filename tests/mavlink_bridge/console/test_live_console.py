@@ -17,6 +17,7 @@ from mavlink_bridge.console.access import Access
 from mavlink_bridge.console.deeds import Refusal
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
 from mavlink_bridge.console.view import driven
+from mavlink_bridge.console.view.events import text_view
 from mavlink_bridge.console.view.instruments import Instruments
 from mavlink_bridge.console.view.plans import plan_id
 from mavlink_bridge.director import State
@@ -324,6 +325,22 @@ def test_a_battery_is_shown_where_it_is_known(message, percent, volts):
     instruments.receive(m.Frame(1, 1, message), 0.0)
     seen = instruments.vehicle(Situation())
     assert (seen.battery_percent, seen.battery_v) == (percent, volts)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("EKF failsafe", "EKF failsafe"),
+        ("<b>not markup</b>", "<b>not markup</b>"),  # the page writes texts, never markup
+        ("one\ntwo\x1b[31m", r"one\ntwo\x1b[31m"),
+        ("\u202edlof", r"\u202edlof"),
+        ("A" * 500, "A" * 500),
+        ("A" * 10_000, "A" * 500 + "…"),
+        ("\u202e" * 10_000, (r"\u202e" * 100)[:500] + "…"),
+    ],
+)
+def test_texts_of_a_vehicle_are_shown_as_what_they_are_and_never_without_end(text, shown):
+    assert text_view(m.Statustext(2, text), 1.0).text == shown
 
 
 def test_heartbeats_that_are_missing_are_counted():

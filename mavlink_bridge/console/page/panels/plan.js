@@ -202,7 +202,8 @@ function noRoute(why, act) {
   const metres = widest ? Math.floor(widest.clearance_m * 100 + 1e-6) / 100 : 0;
   return [
     h("strong", { class: "headline" }, `✗ ${texts.noRoute.title}`), h("p", {}, why.message), why.advice && h("p", {}, why.advice),
-    widest && h("p", {}, (widest.is_driven ? texts.noRoute.widest : texts.noRoute.widestDrawn)(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`),
+    // What only straight legs keep stands in the message, where it is room that is missing.
+    widest && (widest.is_driven ? h("p", {}, texts.noRoute.widest(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`) : h("p", {}, texts.noRoute.widestDrawn)),
     why.blockers.length > 0 && h("p", {}, `${texts.noRoute.blockers}: ${why.blockers.map((one) => one.name).join(", ")}`),
     isServed && widest && metres > 0 && (widest.is_driven ? button(texts.noRoute.take(metres), () => act.setClearance(metres), { class: "main" }) : button(texts.noRoute.takeWidest, () => act.askWidest(), { class: "main" })),
   ];

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from contextlib import contextmanager
@@ -27,6 +28,12 @@ FENCE = str(FIELDS / "maze-fence.waypoints")
 START = "40.0712247,-105.2302031"
 MIDDLE = (-105.2294, 40.0719)
 DESKTOP = {"width": 1280, "height": 800}
+PHONE = {
+    "viewport": {"width": 390, "height": 844},
+    "is_mobile": True,
+    "has_touch": True,
+    "device_scale_factor": 1,
+}
 WAIT_MS = 60_000
 
 
@@ -93,6 +100,11 @@ def drives(browser: Browser) -> None:
         page.get_by_role("button", name="Take control").click()
         set_target(page, "40.0726316, -105.2290497")
         shoot(page, "console-plan")
+        night = Watched(browser.new_context(viewport=DESKTOP, color_scheme="dark"), server.url)
+        small = Watched(browser.new_context(**PHONE), server.url)
+        for seen_too in (night, small):  # before the drive: opening them takes a while
+            seen_too.open()
+            seen_too.page.get_by_role("tab", name="Drive").click()
         page.get_by_role("button", name="Upload, verified").click()
         start = page.get_by_role("button", name="Start: press and hold")
         expect(start).to_be_enabled(timeout=WAIT_MS)
@@ -100,19 +112,14 @@ def drives(browser: Browser) -> None:
         page.keyboard.down("Enter")
         expect(page.locator(".chip-mode")).to_contain_text("AUTO", timeout=WAIT_MS)
         page.keyboard.up("Enter")
-        page.wait_for_timeout(16_000)
-        with page_of(browser, server.url, color_scheme="dark") as night:
-            night.page.get_by_role("tab", name="Drive").click()
-            shoot(night.page, "console-drive")
-        phone = {
-            "viewport": {"width": 390, "height": 844},
-            "is_mobile": True,
-            "has_touch": True,
-            "device_scale_factor": 1,
-        }
-        with page_of(browser, server.url, **phone) as small:
-            small.page.get_by_role("tab", name="Drive").click()
-            shoot(small.page, "console-phone")
+        progress = night.page.locator("#part-drive .facts dd").nth(1)
+        expect(progress).to_have_text(
+            re.compile(r"^([5-9]\d|1\d\d)\.\d of ")
+        )  # under way, whatever the computer does beside
+        for seen_too, name in ((night, "console-drive"), (small, "console-phone")):
+            shoot(seen_too.page, name)
+            assert seen_too.troubles == [], seen_too.troubles
+            seen_too.page.context.close()
 
 
 def replays(browser: Browser) -> None:

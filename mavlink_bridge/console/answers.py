@@ -72,7 +72,7 @@ def look_at_plan(
     should_stop: Callable[[], bool],
     clock: Callable[[], float],
 ) -> Looked:
-    """Plan what a page asks for.
+    """Plan what a page asks for; that there is no room for it is answered at once, without the widest route that can be driven.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def look_at_plan(
     situation = reading.with_fence(situation, body.fence)
     request = reading.plan_request(body, own)
     try:
-        planned = make_plan(situation, request, should_stop=should_stop)
+        planned = make_plan(situation, request, should_stop=should_stop, compares=False)
     except PlanStoppedError:
         raise
     except MissionError as error:

@@ -535,13 +535,11 @@ class ConsoleRoutes:
 
     async def take_control(self, request: Request) -> Response:
         """Let the page have control."""
-        await self._hub.take_control(_page_id(request.headers.get("x-page-id")))
-        return answer(TakenUp())
+        return answer(TakenUp(text=await self._hub.take_control(_page_id(request.headers.get("x-page-id")))))
 
     async def give_control(self, request: Request) -> Response:
         """Take control back from the page."""
-        await self._hub.give_control(_page_id(request.headers.get("x-page-id")))
-        return answer(TakenUp())
+        return answer(TakenUp(text=await self._hub.give_control(_page_id(request.headers.get("x-page-id")))))
 
     # The WebSocket
 

@@ -140,24 +140,33 @@ class Hub:
         )
         self.wake()
 
-    async def take_control(self, page_id: str) -> None:
-        """Let a page have control, tell all, and do nothing any more of what the page before it waits for."""
+    async def take_control(self, page_id: str) -> str:
+        """Let a page have control, tell all, and do nothing any more of what the page before it waits for; return what that page must know."""
         before, now_s = self.control.holder(self.clock()), self.clock()
         self.control.take(page_id, now_s)
         name = self.control.name_of(page_id)
         if name != before:
             self.tell(f"{name} took control" + (f" from {before}" if before else ""), "notice")
         self.show_control()
-        if self.is_live:
-            await self.backend.do(TakeControl(), name)
+        return await self._end_wishes(TakeControl(), name)
 
-    async def give_control(self, page_id: str) -> None:
-        """Take control back from a page, and do nothing any more of what it waits for."""
+    async def give_control(self, page_id: str) -> str:
+        """Take control back from a page, and do nothing any more of what it waits for; return what that page must know."""
         if not self.control.give(page_id):
-            return
+            return ""
         self.show_control()
-        if self.is_live:
-            await self.backend.do(GiveControl(), self.control.name_of(page_id))
+        return await self._end_wishes(GiveControl(), self.control.name_of(page_id))
+
+    async def _end_wishes(self, deed: Deed, page: str) -> str:
+        """Have the bridge end what waits, now that control is with somebody else; control itself is the server's, and has changed whatever the bridge answers."""
+        if not self.is_live:
+            return ""
+        try:
+            return await self.backend.do(deed, page)
+        except Refusal as refusal:
+            text = f"control has changed, but what was waited for before may still be done: {refusal.problem.message}"
+            self.tell(text, "warning")
+            return text
 
     def keep(self, looked: Looked) -> None:
         """Remember a plan that was looked at, so that it can be asked for by its id."""

@@ -101,7 +101,14 @@ class LiveBackend:
         holds = [index for index, asked in enumerate(batch) if isinstance(asked.deed, Hold)]
         for index, asked in enumerate(batch):
             only_stops = asked.deed.only_stops
-            if self.desk is None or (asked.answer.cancelled() and not only_stops):
+            if asked.answer.cancelled() and not only_stops:
+                continue
+            if self.desk is None:
+                _tell(
+                    asked,
+                    asked.answer.set_exception,
+                    not_now("pbpp has only just started: nothing was sent", "ask again"),
+                )
                 continue
             if not only_stops and holds and index < holds[-1]:
                 _tell(

@@ -278,6 +278,11 @@ class Director:
         """Whether a word to drive was given, and `withhold_drive` would still keep the vehicle where it is."""
         return self._parts.starter.awaits_start
 
+    @property
+    def is_left_armed(self) -> bool:
+        """Whether the vehicle stands armed in HOLD because we have armed it, for a drive that has not begun."""
+        return self._parts.starter.is_left_armed
+
     def withhold_drive(self, now_s: float) -> None:
         """Take the word to drive back: what has not begun does not begin. Once AUTO was sent, only `hold` stops the vehicle; a way home goes on."""
         self._heed(self._parts.starter.withhold(), now_s)

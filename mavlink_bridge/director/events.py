@@ -41,6 +41,7 @@ class EventName(StrEnum):
     ADOPTED = auto()
     NOT_ADOPTED = auto()
     PROGRESS = auto()
+    LEFT_ARMED = auto()
     LEFT_ENVELOPE = auto()
     BREACH_AHEAD = auto()
     BREACH = auto()
@@ -94,6 +95,7 @@ SCHEMA: dict[EventName, tuple[Severity, tuple[str, ...]]] = {
         Severity.INFO,
         ("item", "distance_left_m", "time_left_s", "least_clearance_m", "deviation_m", "position"),
     ),
+    EventName.LEFT_ARMED: (Severity.WARNING, ()),
     EventName.LEFT_ENVELOPE: (Severity.WARNING, ("outside_m", "position")),
     EventName.BREACH_AHEAD: (
         Severity.CRITICAL,

@@ -79,6 +79,7 @@ class Parts:
             self.obstacles,
             self.inbox,
             self.adopter,
+            self.starter,
         )
         self.timed: tuple[Part, ...] = (
             self.halter,

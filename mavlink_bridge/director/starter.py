@@ -31,8 +31,14 @@ if TYPE_CHECKING:
     from mavlink_bridge.director.list_watch import ListWatch
     from mavlink_bridge.director.route_desk import RouteDesk
     from mavlink_bridge.errors import BridgeError
+    from mavlink_bridge.mavlink.messages import Frame
 
 START_YOURSELF = "arm it, then give the target again (or run the command again); or arm it in HOLD and switch it to AUTO yourself"
+
+_LEFT_ARMED = "pbpp armed the vehicle for a drive that has not begun: it stands armed in HOLD; disarm it, or start the drive again"
+
+_ARMS_LATE_S = 5.0
+"""So long after the command to arm a vehicle may still become armed by it: longer than it is repeated for. Chosen, not measured."""
 
 _MOVED_M = 1.0
 """A vehicle that stands within this of where its route begins counts as not having moved since it was planned."""
@@ -58,6 +64,8 @@ class Starter(Part):
         fence: FenceGuard,
     ) -> None:
         super().__init__(core)
+        self._armed_s: float | None = None  # when it was told to arm, for a drive that has not begun
+        self._is_armed_told = False
         self._fence = fence
         self._lists = lists
         self._halter = halter
@@ -81,6 +89,32 @@ class Starter(Part):
     def awaits_start(self) -> bool:
         """Whether the word was given, and the vehicle was not switched to AUTO on it yet; a way home needs none."""
         return self.is_told and not self._is_home
+
+    @property
+    def is_left_armed(self) -> bool:
+        """Whether the vehicle stands armed in HOLD by us, and no drive is begun: its start was taken back, stopped or refused after it was armed."""
+        situation = self.core.situation
+        is_ours = self._armed_s is not None and self.core.state is not State.STARTING
+        return is_ours and bool(situation.armed) and situation.mode == self.core.modes.hold
+
+    def receive(self, frame: Frame, now_s: float) -> Sequence[Signal]:
+        """Notice a vehicle that we have armed and that does not drive: once it is somebody else's, or disarmed, nothing more is said of it."""
+        if (
+            self._armed_s is None
+            or not self.core.is_from_vehicle(frame)
+            or not isinstance(frame.message, m.Heartbeat)
+        ):
+            return []
+        situation = self.core.situation
+        if self.is_left_armed:
+            if not self._is_armed_told:
+                self._is_armed_told = True
+                self.core.voice.tell(now_s, EventName.LEFT_ARMED, _LEFT_ARMED)
+        elif self.core.state is not State.STARTING:
+            is_late = now_s > self._armed_s + _ARMS_LATE_S
+            if self._is_armed_told or is_late or situation.mode != self.core.modes.hold:
+                self._armed_s = None
+        return []
 
     def begin_on_word(self, now_s: float) -> Sequence[Signal]:
         """Return that a person gives the word to drive: now, or once the mission is verified; one that the vehicle has refused is judged again first."""
@@ -147,6 +181,7 @@ class Starter(Part):
         if not found.holds and (found.moved_m > _MOVED_M or self._desk.is_stale):
             return self._desk.broke(found, now_s)
         if core.orders.arm and not situation.armed:
+            self._armed_s, self._is_armed_told = now_s, False
             core.steps.run([self._command(Command.COMPONENT_ARM_DISARM, self._armed)], now_s)
         else:
             self._go_off(now_s)
@@ -234,6 +269,7 @@ class Starter(Part):
         if not machine.is_granted:
             self._driver.stand_by()
             return self._failed("DO_SET_MODE", machine.result_name, "", now_s)
+        self._armed_s = None
         self.core.operator.settle(now_s)
         if self._first_item is not FirstItem.BY_COMMAND_IN_MISSION:
             return [Cue.STARTED]

@@ -50,7 +50,11 @@ _LESS_HELPS = frozenset(
 
 
 def plan_route(
-    situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None
+    situation: Situation,
+    request: Request,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    compares: bool = True,
 ) -> Plan:
     """Plan a route over the request's targets in their order, else to the one that the situation holds.
 
@@ -71,7 +75,7 @@ def plan_route(
     warnings += [*asked.warnings, *_start_remarks(plain, start, vehicle)]
     heading_deg = heading_at(situation, start)
     sought, wanted = _sought(ground, (start, *targets), request, asked, should_stop), asked
-    asked, found = _route(sought, request, wanted, vehicle, heading_deg)
+    asked, found = _route(sought, request, wanted, vehicle, heading_deg, compares=compares)
     if asked.promised_m < wanted.promised_m:
         warnings += stop_warnings(vehicle, asked)
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
@@ -132,7 +136,13 @@ def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:
 
 
 def _route(
-    sought: Sought, request: Request, asked: Promise, vehicle: Vehicle, heading_deg: float | None
+    sought: Sought,
+    request: Request,
+    asked: Promise,
+    vehicle: Vehicle,
+    heading_deg: float | None,
+    *,
+    compares: bool,
 ) -> tuple[Promise, DrivenRoute]:
     """Return the route and what is promised for it.
 
@@ -141,7 +151,7 @@ def _route(
     StartBlockedError, TargetBlockedError, NoRouteError
         There is none.
     """
-    found = _looked_for(sought, request, asked, vehicle, heading_deg)
+    found = _looked_for(sought, request, asked, vehicle, heading_deg, compares=compares)
     if isinstance(found, NoRoute):
         raise explained(found, vehicle).error()
     return found
@@ -149,7 +159,13 @@ def _route(
 
 @uncollected()
 def _looked_for(
-    sought: Sought, request: Request, asked: Promise, vehicle: Vehicle, heading_deg: float | None
+    sought: Sought,
+    request: Request,
+    asked: Promise,
+    vehicle: Vehicle,
+    heading_deg: float | None,
+    *,
+    compares: bool,
 ) -> Found | NoRoute:
     """Return the route and what is promised for it; else why there is none.
 
@@ -158,7 +174,7 @@ def _looked_for(
     """
     if asked.allowance_m is None:
         promised = PromisedRoute(sought, vehicle, heading_deg)
-        find, widest = promised.find, promised.widest
+        find, widest = partial(promised.find, compares=compares), promised.widest
     else:
         find, widest = partial(uniform_route, sought), partial(widest_uniform_route, sought)
     found = widest(asked) if request.widest else find(asked)

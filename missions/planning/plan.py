@@ -28,7 +28,13 @@ if TYPE_CHECKING:
     from missions.situation import Situation
 
 
-def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bool] | None = None) -> Plan:
+def plan(
+    situation: Situation,
+    request: Request,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    compares: bool = True,
+) -> Plan:
     """Plan what is asked for around the situation's fence, in as many items as the vehicle holds.
 
     Parameters
@@ -39,6 +45,9 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         What is asked for; all of it is kept, or refused.
     should_stop : callable, optional
         Asked now and then; once it returns True, nobody waits for the plan any more.
+    compares : bool
+        Whether a refusal for want of room names what the widest route keeps while driven, which takes as long as several plans; else it names what
+        straight legs keep.
 
     Raises
     ------
@@ -63,9 +72,9 @@ def plan(situation: Situation, request: Request, *, should_stop: Callable[[], bo
         planned = repaired_plan(situation, request, should_stop=should_stop)
         return _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
     if isinstance(request, Tour):
-        planned = plan_tour(situation, request, should_stop=should_stop)
+        planned = plan_tour(situation, request, should_stop=should_stop, compares=compares)
     else:
-        planned = plan_route(situation, request, should_stop=should_stop)
+        planned = plan_route(situation, request, should_stop=should_stop, compares=compares)
     planned = _with_room(planned, situation, request, should_stop)
     planned = _told_of_obstacles(with_hold(marked(planned, request), situation), situation)
     if isinstance(request, Tour) and request.way_home_inside:

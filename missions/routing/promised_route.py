@@ -43,6 +43,7 @@ from missions.words import metres
 if TYPE_CHECKING:
     from missions.fitting.cost import Measured
     from missions.promise import Promise
+    from missions.routing.bottleneck import NarrowestPlace
     from missions.routing.drawn_route import Sought
     from missions.vehicle import Vehicle
 
@@ -101,15 +102,17 @@ class PromisedRoute:
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
     _known: SharedWork = field(default_factory=SharedWork, init=False)
 
-    def find(self, asked: Promise) -> Found | NoRoute:
-        """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
+    def find(self, asked: Promise, *, compares: bool = True) -> Found | NoRoute:
+        """Return a route that keeps at least what is asked, and what is promised for it; else why there is none, compared with the widest or not."""
         found = self._fitted(asked)
         if isinstance(found, NoRoute) and found.at_start:
             found = self._search(asked.required_m, asked.required_m).nearer_start() or found
         if isinstance(found, DrivenRoute):
             found = self._quickest_of_more(self._quicker(found, asked), asked)
             return _promised(asked, found), found
-        return found if found.is_held else self._compared(found, asked)
+        if found.kind is not NoRouteKind.TOO_NARROW or found.is_held:
+            return found
+        return self._compared(found, asked) if compares else self._drawn_only(found)
 
     def _fitted(self, asked: Promise) -> DrivenRoute | NoRoute:
         """Return a route that keeps at least what is asked; else why none was found."""
@@ -270,8 +273,6 @@ class PromisedRoute:
 
     def _compared(self, why: NoRoute, asked: Promise) -> NoRoute:
         """Return why there is no route, with what the widest one keeps while this vehicle drives it."""
-        if why.kind is not NoRouteKind.TOO_NARROW:
-            return why
         widest = self.widest(asked)
         if isinstance(widest, NoRoute):
             text = f"{why.text}, and this vehicle can drive none of the routes tried, at any clearance"
@@ -279,8 +280,7 @@ class PromisedRoute:
         promised_m = widest[0].promised_m
         facts = {**why.facts, "widest_m": round(promised_m, 3)}
         text = f"no route keeps {self.sought.asked} while driving; the widest keeps {metres(promised_m)}"
-        places = filter(None, self.sought.narrowest_places())
-        place = min(places, key=lambda place: place.clearance_m)
+        place = self._narrowest
         if place.clearance_m < promised_m:  # the start itself, which the route leaves behind
             return replace(why, text=text, facts=facts)
         return replace(
@@ -288,6 +288,19 @@ class PromisedRoute:
             text=f"{text} ({metres(place.clearance_m)} along straight legs){place.where}",
             facts={**facts, "widest_drawn_m": round(place.clearance_m, 3)},
         )
+
+    def _drawn_only(self, why: NoRoute) -> NoRoute:
+        """Return why there is no route, with what the widest one keeps along straight legs; what it keeps while driven is not looked for."""
+        place = self._narrowest
+        facts = {key: value for key, value in why.facts.items() if key != "widest_m"}
+        text = f"no route keeps {self.sought.asked}; along straight legs the widest keeps {metres(place.clearance_m)}{place.where}"
+        return replace(why, text=text, facts={**facts, "widest_drawn_m": round(place.clearance_m, 3)})
+
+    @property
+    def _narrowest(self) -> NarrowestPlace:
+        """The narrowest place of the widest route over all ends, where there is one."""
+        places = filter(None, self.sought.narrowest_places())
+        return min(places, key=lambda place: place.clearance_m)
 
     @cached_property
     def _most_drawn_m(self) -> float | NoRoute:

@@ -66,7 +66,13 @@ class TargetOrder:
     bound_m: float
 
 
-def plan_tour(situation: Situation, request: Tour, *, should_stop: Callable[[], bool] | None = None) -> Plan:
+def plan_tour(
+    situation: Situation,
+    request: Tour,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    compares: bool = True,
+) -> Plan:
     """Plan a route over one target or several, in the best order, home again, with an end.
 
     Raises
@@ -81,7 +87,9 @@ def plan_tour(situation: Situation, request: Tour, *, should_stop: Callable[[], 
         targets = tuple(targets[index] for index in found.indices)
     if request.comes_back:
         targets = (*targets, situation.home.value if situation.home else start)
-    planned = plan_route(situation, replace(request, targets=targets), should_stop=should_stop)
+    planned = plan_route(
+        situation, replace(request, targets=targets), should_stop=should_stop, compares=compares
+    )
     planned = with_end(planned, situation, request)
     return planned if found is None else _with_order(planned, found)
 

@@ -2,6 +2,7 @@
 
 import { postForFile, post } from "./connection.js";
 import { EMPTY, fenceBody, inserted, missionBody, replaced, startBody, swapped, without, zonesOf } from "./doc.js";
+import { saveAs, shownName } from "./dom.js";
 import { rounded } from "./geo.js";
 import { History } from "./history.js";
 import { refusal } from "./planner.js";
@@ -11,6 +12,8 @@ import { texts } from "./texts.js";
 /** @typedef {import("./types.js").Doc} Doc */
 /** @typedef {import("./types.js").PageState} PageState */
 /** @typedef {import("./types.js").Zone} Zone */
+
+const MOST_BYTES = 4 * 1024 * 1024; // as the server takes (wire.MOST_BYTES): a larger file would be sent for nothing
 
 export class Actions {
   /**
@@ -25,6 +28,8 @@ export class Actions {
     /** @type {Zone[] | null} */
     this.sentZones = null;
     this.hasGiven = false; // control, by a person here
+    /** Files that are opened come one after the other: a fence, and then the mission in it. */
+    this.opening = Promise.resolve(true);
     store.watch(["upload"], () => this.sentZones && this.seeTransfer());
     this.history = new History(/** @type {Doc} */ (EMPTY), (doc) => {
       const zone = store.state.zone;
@@ -43,6 +48,12 @@ export class Actions {
   }
 
   undo() {
+    const { drawn } = this.store.state;
+    if (drawn.length > 0) {
+      this.store.set({ drawn: drawn.slice(0, -1) });
+      this.tell(texts.tools.undone(texts.steps.drawnCorner), false);
+      return;
+    }
     this.tell(texts.tools.undone(this.history.undo()), false);
   }
 
@@ -303,12 +314,12 @@ export class Actions {
   }
 
   takeControl() {
-    return this.attempt(texts.top.control.take, () => post("/api/control/take"));
+    return this.attempt(texts.top.control.take, async () => this.tell((await post("/api/control/take")).text, true));
   }
 
   giveControl() {
     this.hasGiven = true;
-    return this.attempt(texts.top.control.give, () => post("/api/control/give"));
+    return this.attempt(texts.top.control.give, async () => this.tell((await post("/api/control/give")).text, true));
   }
 
   /** @param {string} name */
@@ -320,14 +331,25 @@ export class Actions {
 
   /** @param {File} file */
   open(file) {
-    return this.attempt(texts.files.open, async () => {
+    this.opening = this.opening.then(() => this.openOne(file));
+    return this.opening;
+  }
+
+  /** @param {File} file */
+  openOne(file) {
+    const name = shownName(file.name);
+    if (file.size > MOST_BYTES) {
+      this.tell(texts.refused(texts.files.open, texts.files.tooLarge(name, file.size)), true);
+      return Promise.resolve(false);
+    }
+    return this.attempt(texts.files.openName(name), async () => {
       const found = await post(`/api/import?name=${encodeURIComponent(file.name)}`, file);
-      const parts = openedParts(found, file.name);
+      const parts = openedParts(found, name);
       if (Object.keys(parts.doc).length > 0) {
         this.change(parts.step, parts.doc);
       }
-      this.store.set({ opened: { name: file.name, remarks: found.remarks } });
-      this.tell(texts.files.opened(file.name, parts.words.join(", ") || texts.files.empty), false);
+      this.store.set({ opened: { name, remarks: found.remarks } });
+      this.tell(texts.files.opened(name, parts.words.join(", ") || texts.files.empty), false);
     });
   }
 
@@ -392,16 +414,4 @@ function openedParts(found, name) {
     step = texts.steps.dropMission;
   }
   return { doc, words, step };
-}
-
-/**
- * @param {string} name
- * @param {Blob} data
- */
-export function saveAs(name, data) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(data);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }

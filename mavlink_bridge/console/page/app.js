@@ -26,7 +26,7 @@ import { tabs } from "./tabs.js";
 import { texts } from "./texts.js";
 import { timeline } from "./timeline.js";
 import { toasts } from "./toasts.js";
-import { alarmBar, controlBar, holdBar, typesText, vehicleBar } from "./top.js";
+import { alarms, controlBar, holdBar, typesText, vehicleBar } from "./top.js";
 
 /** @typedef {import("./types.js").PageState} PageState */
 
@@ -86,7 +86,7 @@ function buildPage() {
   fill(document.body,
     h("a", { class: "jump", href: "#hold-bar" }, texts.skipHold), h("a", { class: "jump", href: "#panel" }, texts.skip),
     h("header", { class: "top" }, h("div", { class: "brand" }, h("h1", {}, texts.name), source), vehicleBar(store), controlBar(store, actions)),
-    alarmBar(store),
+    alarms(store),
     h("main", {}, mapArea, h("div", { class: "side", id: "panel" }, transferNote(store), panels()), timeline(store, seek), profileChart(store), holdBar(store, actions)),
     toastList);
 }
@@ -230,6 +230,12 @@ async function run() {
   buildPage();
   watchControl();
   document.addEventListener("keydown", press);
+  window.addEventListener("beforeunload", (event) => {
+    // The browser asks before it drops a fence that stands nowhere else.
+    if (store.state.doc.zones !== null || store.state.drawn.length > 0) {
+      event.preventDefault();
+    }
+  });
   acceptDrops((file) => actions.open(file));
   store.set({ doc: EMPTY });
   setInterval(() => store.set({ clock_s: performance.now() / 1000 + ahead_s }), CLOCK_MS);

@@ -5,6 +5,7 @@ import { isServed } from "./inside.js";
 /** @typedef {{kind: string, message: string, advice: string, details: Record<string, any>}} Refusal */
 
 const SILENT_MS = 3000; // the server says something every second: three missed are a lost connection
+const CONNECT_MS = 10_000; // for a connection to be there: on a slow network, or a busy computer, it takes more than what is a silence later; chosen
 const AGAIN_MS = 1000; // between tries to connect anew; chosen
 const ANSWER_MS = 30_000; // no answer is waited for longer, except by plans, which are cancelled by newer ones
 
@@ -159,7 +160,20 @@ export class Live {
   watch() {
     clearTimeout(this.silence);
     const socket = this.socket;
-    this.silence = setTimeout(() => socket && this.lose(socket), SILENT_MS);
+    this.silence = setTimeout(() => socket && this.miss(socket), SILENT_MS);
+  }
+
+  /**
+   * Nothing was heard: a connection that is still being made gets more time, and it is said that there is none.
+   * @param {WebSocket} socket
+   */
+  miss(socket) {
+    if (socket === this.socket && socket.readyState === WebSocket.CONNECTING) {
+      this.onconnection(false);
+      this.silence = setTimeout(() => this.lose(socket), CONNECT_MS - SILENT_MS);
+    } else {
+      this.lose(socket);
+    }
   }
 
   /** @param {WebSocket} socket */

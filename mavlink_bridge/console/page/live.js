@@ -16,13 +16,13 @@ export function unknown() {
     looked: null, rally: [], home: null,
     request: { targets: [], clearance_m: null, widest: false, order: "given", end: "hold", comes_back: false, speed_mps: null, reserve_m: 0 },
     plan: null, standing: null, mission: null,
-    drive: { state: "listening", state_text: "", since_s: null, awaits_upload: false, awaits_start: false, plan_id: "", can_resume: false, trouble: "", way_home: "", is_driving: false, begun_s: null, next_seq: null,
+    drive: { state: "listening", state_text: "", since_s: null, awaits_upload: false, awaits_start: false, plan_id: "", can_resume: false, is_left_armed: false, trouble: "", way_home: "", is_driving: false, begun_s: null, next_seq: null,
       progress_m: null, length_m: null, left_m: null, eta_s: null, driven_m: null, deviation_m: null, corridor_ok: true, least_clearance_m: null, least_at: null, asked_m: null, breaches: 0 },
     hold: { state: "none", text: "", by: "", asked_s: null, answered_s: null },
     upload: null, replay: null, events: [],
     doc: { start: null, targets: [], clearance_m: null, widest: false, order: "given", comes_back: false, zones: null, mission: null },
     page: "", isConnected: true, clock_s: 0, isPlanning: false, planTrouble: null, hoverLeg: null, hoverAlong_m: null, widest_m: null,
-    lines: [], marks: [], tool: "target", newKind: "exclusion", zone: null, holdSent: "", opened: null, after: null,
+    lines: [], marks: [], tool: "target", newKind: "exclusion", drawn: [], zone: null, holdSent: "", opened: null, after: null,
   };
 }
 

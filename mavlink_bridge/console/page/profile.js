@@ -12,11 +12,12 @@ const LEFT = 40 * SCALE;
 const RIGHT = 40 * SCALE;
 const TOP = 10 * SCALE;
 const BOTTOM = 20 * SCALE;
+const KEY_SHARES = { short: 1 / 100, long: 1 / 10 }; // of the route, that an arrow key goes on by; chosen
 const MOST_CLEAR_M = 10; // more room than this is not told apart: what matters is near the fence
 
 /** @param {import("./store.js").Store<PageState>} store */
 export function profileChart(store) {
-  const drawing = svg("svg", { class: "profile-drawing", role: "img" });
+  const drawing = svg("svg", { class: "profile-drawing" });
   const words = h("p", { class: "quiet profile-words" });
   const marker = svg("line", { class: "profile-rover", y1: TOP, y2: HEIGHT - BOTTOM });
   const cursor = svg("line", { class: "profile-cursor", y1: TOP, y2: HEIGHT - BOTTOM });
@@ -29,7 +30,7 @@ export function profileChart(store) {
     const { plan } = store.state;
     samples = plan?.profile ?? [];
     drawing.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
-    drawing.setAttribute("aria-label", samples.length > 1 ? summary(samples) : texts.profile.none);
+    describe(drawing, samples);
     fill(drawing, ...(samples.length > 1 ? chart(samples, plan?.asked_m ?? null, width, x) : []), cursor, marker);
     say(words, samples.length > 1 ? summary(samples) : texts.profile.none);
     drawing.classList.toggle("empty", samples.length < 2);
@@ -40,15 +41,31 @@ export function profileChart(store) {
     setLine(marker, samples.length > 1 && drive.progress_m !== null ? x(Math.min(drive.progress_m, samples.at(-1)?.s_m ?? 0)) : null);
     setLine(cursor, samples.length > 1 && hoverAlong_m !== null ? x(hoverAlong_m) : null);
   };
-  drawing.addEventListener("pointermove", (event) => {
-    const along_m = ((event.offsetX / drawing.clientWidth) * width - LEFT) / (width - LEFT - RIGHT) * (samples.at(-1)?.s_m ?? 0);
-    const sample = nearest(samples, along_m);
+  const point = (/** @type {Sample | null} */ sample) => {
     store.set({ hoverAlong_m: sample?.s_m ?? null });
     if (sample) {
-      say(words, texts.profile.here(sample.s_m, sample.clearance_m, sample.speed_mps));
+      const text = texts.profile.here(sample.s_m, sample.clearance_m, sample.speed_mps);
+      say(words, text);
+      drawing.setAttribute("aria-valuenow", sample.s_m.toFixed(1));
+      drawing.setAttribute("aria-valuetext", text);
+    }
+  };
+  const leave = () => { store.set({ hoverAlong_m: null }); say(words, samples.length > 1 ? summary(samples) : texts.profile.none); };
+  drawing.addEventListener("pointermove", (event) => {
+    const along_m = ((event.offsetX / drawing.clientWidth) * width - LEFT) / (width - LEFT - RIGHT) * (samples.at(-1)?.s_m ?? 0);
+    point(nearest(samples, along_m));
+  });
+  drawing.addEventListener("pointerleave", leave);
+  drawing.addEventListener("blur", leave);
+  drawing.addEventListener("keydown", (event) => {
+    const step = (samples.at(-1)?.s_m ?? 0) * (event.shiftKey ? KEY_SHARES.long : KEY_SHARES.short);
+    const at_m = store.state.hoverAlong_m ?? 0;
+    const to_m = { ArrowLeft: at_m - step, ArrowDown: at_m - step, ArrowRight: at_m + step, ArrowUp: at_m + step, Home: 0, End: Infinity }[event.key];
+    if (to_m !== undefined && samples.length > 1) {
+      event.preventDefault();
+      point(nearest(samples, Math.min(to_m, samples.at(-1)?.s_m ?? 0)));
     }
   });
-  drawing.addEventListener("pointerleave", () => { store.set({ hoverAlong_m: null }); say(words, samples.length > 1 ? summary(samples) : texts.profile.none); });
   new ResizeObserver(() => {
     if (drawing.clientWidth > 0 && Math.abs(drawing.clientWidth - width) > 2) {
       width = drawing.clientWidth;
@@ -58,6 +75,25 @@ export function profileChart(store) {
   store.watch(["plan"], draw);
   store.watch(["drive", "hoverAlong_m"], place);
   return element;
+}
+
+/**
+ * For who reads it with keys: a place along the route that arrows move, with its clearance and speed as its words.
+ * @param {SVGElement} drawing
+ * @param {Sample[]} samples
+ */
+function describe(drawing, samples) {
+  const isThere = samples.length > 1;
+  const found = isThere
+    ? { role: "slider", tabindex: "0", "aria-label": texts.profile.keys, "aria-valuemin": "0", "aria-valuemax": samples[samples.length - 1].s_m.toFixed(1), "aria-valuenow": "0", "aria-valuetext": summary(samples) }
+    : { role: "img", tabindex: null, "aria-label": texts.profile.none, "aria-valuemin": null, "aria-valuemax": null, "aria-valuenow": null, "aria-valuetext": null };
+  for (const [name, value] of Object.entries(found)) {
+    if (value === null) {
+      drawing.removeAttribute(name);
+    } else {
+      drawing.setAttribute(name, value);
+    }
+  }
 }
 
 /** What the lines are. */

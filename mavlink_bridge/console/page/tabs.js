@@ -19,6 +19,9 @@ export function tabs(store, parts) {
     });
     const name = parts[chosen][0];
     const { tool } = store.state;
+    if (tool === "polygon" || tool === "circle") {
+      return; // who looks elsewhere in between goes on drawing: on the map stand the signs that end it
+    }
     // A click on the map sets targets where targets are asked for, and nothing by accident elsewhere.
     store.set({ tool: isServed && name === "plan" ? (tool === "add" ? "add" : "target") : "none", ...(name === "fence" ? {} : { zone: null }) });
   };

@@ -62,7 +62,8 @@ const en = {
     since: /** @param {string} age_text */ (age_text) => `Last heartbeat ${age_text} ago.`,
     closed: /** @param {string} why */ (why) => `LINK LOST. What you see is old. Use your transmitter. pbpp opens the link again: ${why}`,
     page: "This page has lost its connection to pbpp, and tries again. HOLD from here does not reach the vehicle: use your transmitter.",
-    breach: "The rover is outside its fence",
+    breach: /** @param {number} n */ (n) => `FENCE BREACHED in this drive${n === 1 ? "" : `, ${n} times`}.`,
+    leftArmed: "The rover is ARMED and stands in HOLD: pbpp armed it for a drive that has not begun. Disarm it, or start the drive again.",
     restarted: "pbpp was restarted: the page shows its present state.",
   },
   map: {
@@ -98,7 +99,7 @@ const en = {
   },
   steps: {
     start: "start set", target: "target set", addTarget: "target added", moveTarget: "target moved", removeTarget: "target removed", orderTargets: "targets put in order",
-    clearance: "clearance changed", order: "order of targets", comesBack: "return to the start", zone: "fence zone drawn", moveCorner: "corner moved", removeCorner: "corner removed",
+    clearance: "clearance changed", order: "order of targets", comesBack: "return to the start", zone: "fence zone drawn", drawnCorner: "corner drawn", moveCorner: "corner moved", removeCorner: "corner removed",
     addCorner: "corner added", zoneKind: "stay in and keep out swapped", removeZone: "zone removed", radius: "radius changed", takeFence: "fence taken for editing", heldFence: "back to the vehicle's fence",
     movePoint: "waypoint moved", dropMission: "mission opened", dropFence: "fence opened", dropTargets: "targets opened", plannedRoute: "back to planning", repair: "mission repaired", clear: "all cleared",
   },
@@ -146,7 +147,8 @@ const en = {
   },
   noRoute: {
     title: "No route", here: "here", widest: /** @param {number} value */ (value) => `The widest route there is keeps ${m(value)} (dashed: its straight legs).`, take: /** @param {number} value */ (value) => `Ask for ${m(value)} instead`,
-    between: /** @param {string[]} names */ (names) => `It is narrowest between ${names.join(" and ")}.`,
+    widestDrawn: "Dashed: the straight legs of the widest route. A rover that drives it keeps less.", takeWidest: "Plan the widest route",
+    between: /** @param {string[]} names */ (names) => `It is narrowest ${names.length > 1 ? "between" : "at"} ${names.join(" and ")}.`,
     blockers: "In the way (thick lines)", none: "No route at all, however narrow.",
   },
   start: {
@@ -174,7 +176,7 @@ const en = {
   after: { title: "Driven and promised", promised: "Promised", least: "Least clearance driven", time: "Time", predicted: "predicted", deviation: "Farthest off the line", driven: "Driven", kept: "✓ The promise was kept", keptSoFar: "✓ The promise was kept so far", broken: "✗ The promise was broken", refresh: "Compare now",
     pieces: "Piece by piece, from start to stop", pieceHead: ["Piece", "Driven", "Promised", "Least", "Verdict"],
     piece: /** @param {boolean} isKept @param {boolean} hasArrived */ (isKept, hasArrived) => `${isKept ? "✓ kept" : "✗ BROKEN"}, ${hasArrived ? "arrived" : "stopped"}` },
-  profile: { title: "Clearance and speed along the route", clearance: "clearance", drawn: "drawn line", speed: "speed", asked: "asked", along: "along the route",
+  profile: { title: "Clearance and speed along the route", keys: "Place along the route: arrow keys move it", clearance: "clearance", drawn: "drawn line", speed: "speed", asked: "asked", along: "along the route",
     none: "No route to show.", summary: /** @param {number} least_m @param {number} at_m @param {number} speed_mps */ (least_m, at_m, speed_mps) => `Least clearance ${m(least_m)} at ${at_m.toFixed(0)} m along the route; highest speed ${speed_mps.toFixed(1)} m/s.`,
     here: /** @param {number} s_m @param {number | null} clearance_m @param {number} speed_mps */ (s_m, clearance_m, speed_mps) => `${s_m.toFixed(1)} m: ${m(clearance_m)} clear, ${speed_mps.toFixed(1)} m/s predicted` },
   fence: {
@@ -192,11 +194,11 @@ const en = {
     typeBad: "A polygon needs three corners, a circle one place and a radius.", obstacles: "Reported obstacles (this protects no person)",
   },
   files: {
-    title: "Files", open: "Open a file", drop: "Drop a file anywhere on the page, or choose one: mission, fence or targets. It is checked, not uploaded.", dropNow: "Drop it to open it",
+    title: "Files", open: "Open a file", openName: /** @param {string} name */ (name) => `Open ${name}`, drop: "Drop a file anywhere on the page, or choose one: mission, fence or targets. It is checked, not uploaded.", dropNow: "Drop it to open it",
     formats: /** @param {string[]} all */ (all) => `Reads ${all.join(" ")}`,
     save: "Save", what: "What", format: "Format", download: "Save the file", whats: { plan: "The plan", mission: "The vehicle's mission", fence: "The fence" },
     backups: "Backups", noBackups: "No backups yet: one is made before anything on the vehicle is overwritten.", restore: "Restore", restoreAsk: /** @param {string} name */ (name) => `Write backup ${name} to the vehicle? What is there now is kept as a backup first.`, load: "Look again",
-    opened: /** @param {string} name @param {string} what */ (name, what) => `Opened ${name}: ${what}.`, empty: "nothing to use", remarks: "Remarks on the file",
+    opened: /** @param {string} name @param {string} what */ (name, what) => `Opened ${name}: ${what}.`, empty: "nothing to use", tooLarge: /** @param {string} name @param {number} bytes */ (name, bytes) => `${name} has ${(bytes / 1048576).toFixed(1)} MB; missions and fences have 4 MB at most. A log is shown by pbpp serve --log.`, remarks: "Remarks on the file",
     parts: { mission: /** @param {number} n */ (n) => `a mission of ${n} waypoints`, fence: /** @param {number} n */ (n) => `a fence of ${n} zones`, targets: /** @param {number} n */ (n) => `${n} targets` },
     saveDrawn: "Save what was drawn",
   },

@@ -72,15 +72,36 @@ export function controlBar(store, act) {
   return bar;
 }
 
+/**
+ * What must not be overlooked on any page, whichever of its parts is open.
+ * @param {PageStore} store
+ */
+export function alarms(store) {
+  return [linkAlarm(store), vehicleAlarm(store)];
+}
+
 /** @param {PageStore} store */
-export function alarmBar(store) {
+function vehicleAlarm(store) {
+  const bar = h("div", { class: "vehicle-alarm", role: "alert" });
+  store.watch(["drive", "isConnected"], ({ drive, isConnected }) => {
+    const words = texts.alarm;
+    const said = [drive.breaches > 0 && words.breach(drive.breaches), drive.is_left_armed && words.leftArmed].filter(Boolean);
+    say(bar, isConnected ? said.join(" ") : "");
+    bar.classList.toggle("late", drive.breaches === 0);
+    show(bar, bar.textContent !== "");
+  });
+  return bar;
+}
+
+/** @param {PageStore} store */
+function linkAlarm(store) {
   const bar = h("div", { class: "alarm-bar", role: "alert" });
   const main = h("span", {});
   // The age changes all the time: it is shown beside the alarm, and read out only once.
   const age = h("span", { "aria-hidden": "true" });
   fill(bar, main, age);
-  store.watch(["isConnected", "link", "clock_s", "drive"], (state) => {
-    const { isConnected, link, drive } = state;
+  store.watch(["isConnected", "link", "clock_s"], (state) => {
+    const { isConnected, link } = state;
     const age_s = heartbeatAge_s(state) ?? 0;
     const words = texts.alarm;
     const text = !isConnected ? words.page : link.state === "lost" ? words.lost : link.state === "closed" ? words.closed(link.trouble) : link.state === "late" ? words.late : "";
@@ -89,7 +110,6 @@ export function alarmBar(store) {
     bar.className = `alarm-bar ${link.state === "late" && isConnected ? "late" : ""}`;
     show(bar, text !== "");
     document.documentElement.classList.toggle("is-lost", !isConnected || link.state === "lost" || link.state === "closed");
-    document.documentElement.classList.toggle("is-breached", drive.breaches > 0);
   });
   return bar;
 }

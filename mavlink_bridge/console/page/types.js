@@ -33,7 +33,7 @@
  *   driven_m: number | null, asked_m: number | null, verdict: string, fence: string, at: Place | null, crosses: string[], text: string}} Leg
  * @typedef {{s_m: number, time_s: number, drawn_m: number | null, clearance_m: number | null, speed_mps: number}} ProfileSample
  * @typedef {{kind: string, message: string, advice: string, details: Record<string, any>, at: Place | null, blockers: {name: string, geometry: Geometry | null}[],
- *   widest: {clearance_m: number, at: Place | null, between: string[], path: Geometry | null} | null}} NoRoute
+ *   widest: {clearance_m: number, at: Place | null, between: string[], path: Geometry | null, is_driven: boolean} | null}} NoRoute
  * @typedef {{id: string, state: string, by: string, took_s: number | null, request: Asked, start: Place | null, targets: Place[], asked_targets: Place[],
  *   length_m: number | null, straight_line_m: number | null, duration_s: number | null, promised_m: number | null, asked_m: number | null,
  *   drawn_m: number | null, driven_m: number | null, start_m: number | null, is_promised: boolean, extrapolated: string[], info: string[],
@@ -42,7 +42,7 @@
  *   no_route: NoRoute | null}} Plan
  * @typedef {{id: string, items: number, points: Place[], matches_plan: boolean, time_s: number | null, current_seq: number | null}} HeldMission
  *
- * @typedef {{state: string, state_text: string, since_s: number | null, awaits_upload: boolean, awaits_start: boolean, plan_id: string, can_resume: boolean, trouble: string,
+ * @typedef {{state: string, state_text: string, since_s: number | null, awaits_upload: boolean, awaits_start: boolean, plan_id: string, can_resume: boolean, is_left_armed: boolean, trouble: string,
  *   way_home: string, is_driving: boolean, begun_s: number | null, next_seq: number | null, progress_m: number | null, length_m: number | null,
  *   left_m: number | null, eta_s: number | null, driven_m: number | null, deviation_m: number | null, corridor_ok: boolean,
  *   least_clearance_m: number | null, least_at: Place | null, asked_m: number | null, breaches: number}} Drive
@@ -102,6 +102,7 @@
  * @property {NamedLine[]} lines what is drawn besides in a page that is one file: ways home, lines to rally points
  * @property {NamedMark[]} marks places that must not be missed in it
  * @property {"target" | "add" | "start" | "polygon" | "circle" | "none"} tool what a click on the map does
+ * @property {Place[]} drawn the corners so far of a zone that is being drawn
  * @property {"inclusion" | "exclusion"} newKind what a zone that is drawn next will be
  * @property {number | null} zone which drawn zone is being edited
  * @property {string} holdSent what became of a HOLD before the vehicle's answer; empty where the answer tells

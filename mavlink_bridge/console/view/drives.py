@@ -79,6 +79,7 @@ class DriveShown:
             awaits_upload=director.awaits_confirmation,
             plan_id=plan_id,
             can_resume=can_resume,
+            is_left_armed=director.is_left_armed,
             trouble=str(trouble) if trouble is not None else "",
             way_home=f"{way.place.name}, {way.length_m:.0f} m, about {way.time_s:.0f} s"
             if way is not None

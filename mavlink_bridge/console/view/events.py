@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 """MAV_SEVERITY."""
 
+_MOST_LETTERS = 500
+"""Of an event's text that are shown: a vehicle may send thousands, and all else would be out of sight. Chosen, not measured."""
+
 _PLACES = ("position", "path")
 """Data of events that are places, latitude first; what is shown has the longitude first."""
 
@@ -29,7 +32,7 @@ def event_view(event: Event) -> EventView:
         time_s=round(event.time_s, 3),
         name=str(event.name),
         severity=event.severity.name.lower(),
-        text=harmless(event.text),
+        text=_shown(event.text),
         position=place(LatLon(*at)) if is_place else None,  # type: ignore[misc] # two numbers
         data={key: _plain(value) for key, value in event.data.items() if key not in _PLACES},
     )
@@ -39,8 +42,14 @@ def text_view(message: Statustext, now_s: float) -> EventView:
     """Return what the vehicle wrote."""
     severity = _SEVERITIES[message.severity] if 0 <= message.severity < len(_SEVERITIES) else "info"
     return EventView(
-        id=0, time_s=round(now_s, 3), name="statustext", severity=severity, text=harmless(message.text)
+        id=0, time_s=round(now_s, 3), name="statustext", severity=severity, text=_shown(message.text)
     )
+
+
+def _shown(text: str) -> str:
+    """Return a text as it is shown: harmless, and not without end."""
+    seen = harmless(text[: _MOST_LETTERS + 1])
+    return seen if len(seen) <= _MOST_LETTERS else f"{seen[:_MOST_LETTERS]}…"
 
 
 def _plain(value: object) -> object:

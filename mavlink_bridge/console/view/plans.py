@@ -305,11 +305,13 @@ def no_route_view(
     widest = None
     if ground is not None and narrow and math.isfinite(least_m := min(one.clearance_m for one in narrow)):
         least = next(one for one in narrow if one.clearance_m == least_m)
+        driven_m = details.get("widest_m")
         widest = WidestRoute(
-            round(_number(details.get("widest_m"), least_m), 4),
+            round(_number(driven_m, least_m), 4),
             place(least.at) if least.at else None,
             tuple(dict.fromkeys(least.between)),
             _widest_path(ground, ends, narrow, stop),
+            is_driven=driven_m is not None,
         )
     named = _named(details)
     if not named and widest is not None:

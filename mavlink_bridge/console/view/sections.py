@@ -411,12 +411,19 @@ class Blocker:
 
 @dataclass(frozen=True, slots=True)
 class WidestRoute:
-    """The widest route there is: what it keeps, where it is narrowest and between which fences; ``path`` where it could be planned."""
+    """The widest route there is: what it keeps, where it is narrowest and between which fences; ``path`` are its straight legs.
+
+    Parameters
+    ----------
+    is_driven : bool
+        Whether it keeps ``clearance_m`` while driven; else along straight legs, and ``widest`` asks for the route that keeps most while driven.
+    """
 
     clearance_m: float
     at: Place | None = None
     between: tuple[str, ...] = ()
     path: LineString | None = None
+    is_driven: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -543,6 +550,8 @@ class DriveView:
         Whether the plan that stands waits to be uploaded (`/api/upload`), or is verified and waits to be driven (`/api/start`); ``plan_id`` names it.
     can_resume : bool
         Whether the last target can be gone to again (``/api/resume``).
+    is_left_armed : bool
+        Whether the vehicle stands armed in HOLD because pbpp has armed it, for a drive that has not begun.
     trouble : str
         Why the newest action failed.
     is_driving : bool
@@ -563,6 +572,7 @@ class DriveView:
     awaits_start: bool = False
     plan_id: str = ""
     can_resume: bool = False
+    is_left_armed: bool = False
     trouble: str = ""
     way_home: str = ""
     is_driving: bool = False

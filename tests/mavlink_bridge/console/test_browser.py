@@ -105,12 +105,11 @@ def test_no_route_is_explained_and_the_widest_is_taken_by_a_button(watched: Watc
     page.get_by_role("spinbutton", name="Clearance to keep while driving, metres").fill("8")
     page.keyboard.press("Enter")
     expect(page.locator(".headline")).to_have_text("✗ No route")
-    expect(page.locator("#outcome .card.bad")).to_contain_text("The widest route there is keeps")
+    expect(page.locator("#outcome .card.bad")).to_contain_text("along straight legs the widest keeps")
     expect(page.locator("#outcome .card.bad")).to_contain_text("In the way")
     assert watched.accessible() == []
-    page.get_by_role("button", name="instead").click()
+    page.get_by_role("button", name="Plan the widest route").click()
     expect(page.locator(".headline")).to_contain_text("m promised")
-    widest.click()
     expect(widest).to_have_attribute("aria-pressed", "true")
     expect(page.locator(".headline")).to_contain_text("m promised")
 
@@ -212,6 +211,136 @@ def test_dropped_files_are_opened_and_saved_in_other_formats(watched: Watched) -
         expect(page.get_by_text(f"Opened again{suffix}: a fence of")).to_be_visible()
 
 
+WRONG = r"status of 4\d\d"
+
+DROP = """async (files) => {
+  const data = new DataTransfer();
+  for (const [name, text, bytes] of files) data.items.add(new File([bytes ? new Uint8Array(bytes) : text], name));
+  document.body.dispatchEvent(new DragEvent("drop", {bubbles: true, cancelable: true, dataTransfer: data}));
+}"""
+
+
+def test_wrong_and_hostile_files_are_told_and_two_at_once_are_both_opened(
+    browser: Browser, maze: Served
+) -> None:
+    seen = Watched(browser.new_context(viewport={"width": 1280, "height": 800}), maze.url, expected=WRONG)
+    page = seen.open()
+    told = page.locator(".toast")
+    sent: list[str] = []
+    page.on("request", lambda one: sent.append(one.url) if "/api/import" in one.url else None)
+    for name, text, size, said in (
+        ("photo.jpg", "\xff\xd8\xff\xe0 JFIF", 0, "photo.jpg"),
+        ("empty.plan", "", 0, "empty.plan"),
+        ("run.tlog", "\x00\xfd\x09", 0, "run.tlog"),
+        ("half.plan", '{"fileType": "Plan"', 0, "half.plan"),
+        ("vast.kml", "", 50 * 1024 * 1024, "vast.kml has 50.0 MB"),
+        ("\u202enalp.\n" + "a" * 10_000 + ".plan", "{}", 0, "\\u202enalp.\\u000aaaa"),
+    ):
+        page.evaluate(DROP, [[name, text, size]])
+        expect(told.last).to_contain_text(said)
+        assert "\u202e" not in told.last.inner_text()
+    assert not any("vast" in url for url in sent)
+    box = page.locator(".toasts").bounding_box()
+    assert box is not None
+    assert box["height"] < 700
+    while page.get_by_role("alert").get_by_role("button", name="Close").count():
+        page.get_by_role("alert").get_by_role("button", name="Close").first.click()
+    assert page.get_by_role("tabpanel", name="Plan").inner_text().count("No plan yet") == 1
+
+    # Two at once, a mission first: both are there, and a file with parameters alone changes nothing that is drawn.
+    yard = [(FIELDS / f"yard-{one}.waypoints").read_text(encoding="utf-8") for one in ("mission", "fence")]
+    page.evaluate(DROP, [["yard-mission.waypoints", yard[0], 0], ["yard-fence.waypoints", yard[1], 0]])
+    expect(page.get_by_text("Opened yard-mission.waypoints: a mission of")).to_be_visible()
+    expect(page.get_by_text("Opened yard-fence.waypoints: a fence of")).to_be_visible()
+    expect(page.get_by_text("Checked: yard-mission.waypoints")).to_be_visible()
+    page.evaluate(DROP, [["rover.param", "FENCE_MARGIN,3\nWP_RADIUS,1\n", 0]])
+    expect(page.get_by_text("Opened rover.param:")).to_be_visible()
+    expect(page.get_by_text("Checked: yard-mission.waypoints")).to_be_visible()
+    assert seen.accessible() == []
+    assert seen.troubles == []
+    page.context.close()
+
+
+def focused(page: Page) -> str:
+    """Return the name of what has the focus."""
+    return str(
+        page.evaluate(
+            "document.activeElement.getAttribute('aria-label') || document.activeElement.textContent"
+        )
+    )
+
+
+def test_a_fence_is_drawn_corner_by_corner_with_keys_and_the_focus_is_never_lost(watched: Watched) -> None:
+    page = watched.page
+    page.get_by_role("tab", name="Fence").press("Enter")
+    page.get_by_role("button", name="Edit this fence").press("Enter")
+    expect(page.get_by_role("button", name="Back to the held fence")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Edit this fence")).to_be_focused()
+    page.get_by_role("button", name="Draw a polygon").press("Enter")
+    canvas = page.locator(".map canvas")
+    undo = page.get_by_role("button", name="Undo")
+    for key in ("ArrowRight", "ArrowUp", "ArrowLeft"):
+        canvas.press("t")
+        canvas.press(key)
+        page.wait_for_timeout(500)  # the map glides
+    canvas.press("t")
+    undo.press("Enter")
+    expect(page.get_by_text("Undone: corner drawn")).to_be_visible()
+    # A look elsewhere in between costs nothing.
+    page.get_by_role("tab", name="Events").press("Enter")
+    page.get_by_role("tab", name="Fence").press("Enter")
+    canvas.press("Enter")
+    expect(page.locator("ol.plain > li")).to_have_count(10)
+    page.get_by_role("button", name="Corners: 10.").press("Enter")  # it is open: it was drawn just now
+    page.get_by_role("button", name="Corners: 10.").press("Enter")
+    expect(page.locator("ol.places textbox, ol.places input[aria-label^='Corner']")).to_have_count(3)
+    page.get_by_role("button", name="Remove: 10.").press("Enter")
+    expect(page.locator("ol.plain > li")).to_have_count(9)
+    assert focused(page) != page.locator("body").text_content()
+
+    # The profile is read with arrows.
+    page.get_by_role("tab", name="Plan").press("Enter")
+    set_target(page)
+    expect(page.locator(".headline")).to_contain_text("✓")
+    place = page.get_by_role("slider", name="Place along the route")
+    for _ in range(3):
+        place.press("Shift+ArrowRight")
+    expect(place).to_have_attribute("aria-valuetext", re.compile(r"^\d+\.\d m: .* clear, .* m/s predicted$"))
+    assert float(place.get_attribute("aria-valuenow") or 0) > 10
+    assert watched.accessible() == []
+
+
+def test_what_must_not_be_overlooked_of_the_rover_stands_on_every_page(watched: Watched) -> None:
+    said = watched.page.evaluate(
+        """async () => {
+          const [{ Store }, { alarms }, { unknown }] = await Promise.all(["store", "top", "live"].map((name) => import(`/page/${name}.js`)));
+          const store = new Store(unknown());
+          const [, bar] = alarms(store);
+          const found = [];
+          for (const parts of [{}, { is_left_armed: true }, { is_left_armed: true, breaches: 2 }, {}]) {
+            store.set({ drive: { ...unknown().drive, ...parts } });
+            await Promise.resolve();
+            found.push([bar.hidden, bar.textContent, bar.getAttribute("role"), bar.classList.contains("late")]);
+          }
+          return found;
+        }"""
+    )
+    assert [one[0] for one in said] == [True, False, False, True]
+    assert "ARMED and stands in HOLD" in said[1][1]
+    assert said[2][1].startswith("FENCE BREACHED in this drive, 2 times.")
+    assert [one[2:] for one in said[1:3]] == [["alert", True], ["alert", False]]
+
+
+TOUCHED = """() => [...document.querySelectorAll("button, select, input, textarea, summary")].flatMap((one) => {
+  const label = ["radio", "checkbox"].includes(one.type) ? one.closest("label") : null;
+  const { width, height, left, right } = (label ?? one).getBoundingClientRect();
+  const isSeen = one.getClientRects().length > 0 && getComputedStyle(one).visibility === "visible";
+  return isSeen && (width < 40 || height < 40 || left < 0 || right > innerWidth) && !one.matches(".handle")
+    ? [`${one.getAttribute("aria-label") ?? one.textContent}: ${width} x ${height}, ${left} to ${right}`] : [];
+})"""
+
+
 def test_a_phone_in_the_dark(browser: Browser, maze: Served) -> None:
     context = browser.new_context(
         viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True
@@ -224,6 +353,7 @@ def test_a_phone_in_the_dark(browser: Browser, maze: Served) -> None:
     for name in ("Plan", "Drive", "Fence", "Files", "Events"):
         page.get_by_role("tab", name=name).click()
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert page.evaluate(TOUCHED) == []  # nothing is smaller than a finger, or cut
         assert seen.accessible() == []
     assert seen.troubles == []
     context.close()

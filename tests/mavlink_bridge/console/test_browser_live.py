@@ -307,15 +307,63 @@ def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
         # What Chromium says of a server that is gone is meant.
         seen = open_page(browser, server.url, expected=r"net::ERR_|WebSocket connection")
         set_target(seen.page, "40.0723079, -105.2285800")
+        # Work under way: two corners of a zone.
+        seen.page.get_by_role("tab", name="Fence").click()
+        seen.page.get_by_role("button", name="Draw a polygon").click()
+        seen.click_map(0.4, 0.5)
+        seen.click_map(0.45, 0.5)
         server.stop()
         expect(seen.page.locator(".alarm-bar")).to_contain_text("This page has lost its connection to pbpp")
         with serving("--fence", fence, "--start", "40.0712247,-105.2302031", port=port):
             expect(seen.page.locator(".alarm-bar")).to_be_hidden()
+            # What was begun goes on: the polygon gets its third corner, and is a zone; then it is undone.
+            seen.click_map(0.45, 0.4)
+            seen.page.keyboard.press("Enter")
+            expect(seen.page.locator("ol.plain > li")).to_have_count(10)
+            seen.page.get_by_role("button", name="Back to the held fence").click()
+            seen.page.get_by_role("tab", name="Plan").click()
             # What was asked for is still there, and can be asked again.
             expect(seen.page.locator(HEADLINE)).to_have_text("✓ 2.50 m promised")
             seen.page.get_by_role("button", name="widest possible").click()
             expect(seen.page.locator(HEADLINE)).to_contain_text("m promised")
             close(seen)
+
+
+def test_a_page_that_stalls_changes_nothing_for_the_rover_and_says_so_when_it_returns(
+    browser: Browser,
+) -> None:
+    with serving("--demo") as server:
+        seen, other = open_page(browser, server.url), open_page(browser, server.url)
+        page = seen.page
+        take_control(seen)
+        set_target(page, FAR)
+        upload(seen)
+        press_start(page)
+        page.evaluate(
+            """() => {
+              window.said = [];
+              const bar = document.querySelector(".alarm-bar");
+              new MutationObserver(() => window.said.push(bar.textContent)).observe(bar, { childList: true, characterData: true, subtree: true });
+            }"""
+        )
+        debugger = page.context.new_cdp_session(page)
+        debugger.send("Debugger.enable")
+        debugger.send("Debugger.pause")  # nothing on the page runs any more
+        progress = other.page.locator("#part-drive .facts dd").nth(1)
+        before = progress.text_content()
+        other.page.wait_for_timeout(12_000)
+        expect(other.page.locator(".chip-mode")).to_contain_text("AUTO")
+        expect(other.page.locator(".who")).to_have_text(re.compile(r"page \d+ holds control$"))
+        assert progress.text_content() != before  # it drives on
+        debugger.send("Debugger.resume")
+        debugger.detach()
+        page.wait_for_function("window.said.some((text) => text.includes('This page has lost pbpp'))")
+        expect(page.locator(".alarm-bar")).to_be_hidden()
+        expect(page.get_by_text("This page holds control")).to_be_visible()  # it was there all the time
+        expect(page.locator(".chip-mode")).to_contain_text("AUTO")
+        page.keyboard.press("h")
+        expect(other.page.locator(".chip-mode")).to_contain_text("HOLD")
+        close(seen, other)
 
 
 def test_a_replay_is_scrubbed_and_played(browser: Browser) -> None:

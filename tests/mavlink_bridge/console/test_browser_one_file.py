@@ -90,7 +90,7 @@ COLOURS = {
         "route": "62b5ff",
         "fence": "f0b440",
         "exclusion": "ff9a8f",
-        "broken": "ff6f66",
+        "broken": "ff7b72",
         "rover": "8ec5ff",
     },
 }
@@ -144,7 +144,7 @@ def test_a_log_is_played_from_the_file(opened):
     seen_there = pixels(seen)
     assert min(seen_there[name] for name in ("rover", "fence", "route")) > 100, seen_there
     expect(page.locator(".chip-mode .chip-value")).to_have_text("HOLD")
-    scrub = page.get_by_role("slider")
+    scrub = page.get_by_label("Moment of the log")
     scrub.press("Home")
     expect(page.locator(".chip-mode .chip-value")).to_have_text("–")
     page.get_by_label("Speed of the replay").or_(page.locator(".timeline select")).first.select_option("60")

@@ -26,6 +26,7 @@ from mavlink_bridge.console.server import open_socket, page_link, qr_code
 from mavlink_bridge.console.view.sections import EventView, Permissions, VehicleView
 from mavlink_bridge.errors import LinkError
 from missions.formats import read_fence
+from missions.routing.promised_route import PromisedRoute
 
 MARKUP = "<img src=x onerror=alert(1)>"
 
@@ -120,6 +121,34 @@ def test_no_route_is_an_answer_with_the_widest_one_and_what_blocks_it(client):
     assert [one["name"] for one in why["blockers"]] == list(why["widest"]["between"])
     assert why["widest"]["path"]["coordinates"][-1] == pytest.approx(TARGET, abs=1e-6)
     assert why["at"] == why["widest"]["at"]
+
+
+def test_too_much_clearance_is_refused_without_looking_for_the_widest_that_can_be_driven(client, monkeypatch):
+    driven = client.post("/api/plan", json=asked(clearance_m=None, widest=True)).json()["promised_m"]
+    monkeypatch.setattr(PromisedRoute, "widest", None)
+    for clearance_m in (driven + 0.3, 9.0, 40.0):
+        why = client.post("/api/plan", json=asked(clearance_m=clearance_m)).json()["no_route"]
+        assert why["widest"]["clearance_m"] > driven
+        assert not why["widest"]["is_driven"]
+        assert "along straight legs" in why["message"]
+
+
+def test_planning_that_takes_a_while_is_cancelled_in_the_midst_of_it(console):
+    hub, address, client = console
+    answers: list[httpx.Response] = []
+
+    def plan() -> None:
+        with httpx.Client(base_url=f"http://{address}", timeout=60) as page:
+            answers.append(page.post("/api/plan", json=asked(clearance_m=None, widest=True), headers=PAGE))
+
+    thread = threading.Thread(target=plan)
+    thread.start()
+    until_s = time.monotonic() + 100
+    while not hub.jobs._newest and time.monotonic() < until_s:
+        time.sleep(0.002)
+    assert client.post("/api/plan/cancel", json={}, headers=PAGE).status_code == 200
+    thread.join(100)
+    assert (answers[0].status_code, answers[0].json()["error"]["kind"]) == (409, "superseded")
 
 
 def test_a_dragged_way_point_breaks_the_promise_at_once(client):

@@ -8,17 +8,21 @@ import threading
 import time
 
 import pytest
-from console.serving import SteppedConsole
+from console.serving import SteppedConsole, files_hub
+from console.test_live_desk import looked_at
 from director.test_bridge_director import FAR, IN_BARN, NEAR
 
 from mavlink_bridge.console import deeds
+from mavlink_bridge.console.access import Access
 from mavlink_bridge.console.deeds import Refusal
 from mavlink_bridge.console.live import LiveBackend, LiveConsole
 from mavlink_bridge.console.view import driven
+from mavlink_bridge.console.view.events import text_view
 from mavlink_bridge.console.view.instruments import Instruments
 from mavlink_bridge.console.view.plans import plan_id
 from mavlink_bridge.director import State
 from mavlink_bridge.mavlink import messages as m
+from mavlink_bridge.simulator.faults import Faults
 from missions.request import Tour
 from missions.situation import Situation
 
@@ -252,6 +256,54 @@ def test_deeds_are_done_in_the_bridges_own_loop(shown, monkeypatch):
     assert "bug in pbpp" in problem.message
 
 
+def test_a_deed_before_the_bridge_is_ready_is_answered_too(shown):
+    shown.backend.desk = None
+
+    def bridge():
+        until_s = time.monotonic() + 100
+        while not shown.backend._asked and time.monotonic() < until_s:
+            time.sleep(0.005)
+        shown.backend.take_asked(shown.run.now_s)
+
+    (problem,) = asked(shown.backend, bridge)
+    assert (problem.kind, "nothing was sent" in problem.message) == ("not_now", True)
+    assert not shown.backend._asked
+
+
+def test_control_that_is_taken_while_the_bridge_does_not_answer_is_taken(shown, monkeypatch):
+    monkeypatch.setattr("mavlink_bridge.console.live._ANSWER_S", 0.05)
+    hub = files_hub(Access.of("127.0.0.1", 1), backend=shown.backend)
+    said = asyncio.run(hub.take_control("a" * 12))
+    assert hub.board.sections["control"].holder == "page 1"
+    assert "may still be done: the bridge does not answer" in said
+    assert [(event.severity, event.text) for event in hub.board.events] == [
+        ("notice", "page 1 took control"),
+        ("warning", said),
+    ]
+    said = asyncio.run(hub.give_control("a" * 12))
+    assert hub.board.sections["control"].holder is None
+    assert "may still be done" in said
+    shown.desk.do = lambda deed, page, now_s: done.append((type(deed).__name__, page)) or ""
+    done: list = []
+    shown.backend.take_asked(shown.run.now_s)  # it only ends what is wanted: done as soon as the bridge can
+    assert done == [("TakeControl", "page 1"), ("GiveControl", "page 1")]
+
+
+def test_a_rover_left_armed_is_shown_until_it_is_disarmed(tmp_path):
+    shown = Shown(tmp_path, {"faults": Faults(latency_s=0.1)})
+    shown.until(lambda: shown.director.state is State.READY)
+    shown.do(deeds.UploadPlan("x", looked_at(shown)))
+    shown.until(lambda: shown.director.state is State.VERIFIED)
+    shown.do(deeds.Start(plan_id(shown.director.plan)))
+    shown.until(lambda: shown.run.vehicles[0].is_armed)
+    shown.do(deeds.TakeControl(), "page 2")
+    shown.until(lambda: shown.pages.state["drive"].is_left_armed, 10)
+    assert shown.director.state is State.VERIFIED
+    shown.run.vehicles[0].rover.is_armed = False
+    shown.until(lambda: not shown.pages.state["drive"].is_left_armed, 10)
+    shown.console.close()
+
+
 def test_a_bridge_that_does_not_answer_is_not_waited_for(shown, monkeypatch):
     monkeypatch.setattr("mavlink_bridge.console.live._ANSWER_S", 0.05)
     (problem,) = asked(shown.backend, lambda: None)
@@ -273,6 +325,22 @@ def test_a_battery_is_shown_where_it_is_known(message, percent, volts):
     instruments.receive(m.Frame(1, 1, message), 0.0)
     seen = instruments.vehicle(Situation())
     assert (seen.battery_percent, seen.battery_v) == (percent, volts)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("EKF failsafe", "EKF failsafe"),
+        ("<b>not markup</b>", "<b>not markup</b>"),  # the page writes texts, never markup
+        ("one\ntwo\x1b[31m", r"one\ntwo\x1b[31m"),
+        ("\u202edlof", r"\u202edlof"),
+        ("A" * 500, "A" * 500),
+        ("A" * 10_000, "A" * 500 + "…"),
+        ("\u202e" * 10_000, (r"\u202e" * 100)[:500] + "…"),
+    ],
+)
+def test_texts_of_a_vehicle_are_shown_as_what_they_are_and_never_without_end(text, shown):
+    assert text_view(m.Statustext(2, text), 1.0).text == shown
 
 
 def test_heartbeats_that_are_missing_are_counted():

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from mavlink_bridge.console import wire
+
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "mavlink_bridge" / "console" / "page"
 VENDORS = (PAGE / "vendor", Path(__file__).parent / "vendor")
@@ -25,6 +27,66 @@ NAMES = {
     "Drive": "DriveView", "Hold": "HoldView", "Transfer": "TransferView", "Event": "EventView", "Replay": "ReplayView",
     **{same: same for same in ("MapSource", "Permissions", "ZoneFacts", "FenceMeant", "RoutePoint", "ProfileSample")},
 }  # fmt: skip
+
+
+def _colours(name: str) -> dict[str, list[float]]:
+    """The map's table of colours, as red, green and blue."""
+    text = (PAGE / "map" / "style.js").read_text(encoding="utf-8")
+    table = re.search(rf"const {name} = \{{(.*?)\}};", text, re.DOTALL)
+    assert table is not None
+    found = re.findall(r'(\w+): "#(\w{6})"', table.group(1))
+    return {key: [int(value[i : i + 2], 16) for i in (0, 2, 4)] for key, value in found}
+
+
+def _contrast(one: list[float], other: list[float]) -> float:
+    """The ratio of WCAG 2."""
+
+    def light(colour: list[float]) -> float:
+        parts = [value / 255 for value in colour]
+        red, green, blue = (v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in parts)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    dark, bright = sorted((light(one), light(other)))
+    return (bright + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("name", ["LIGHT", "DARK"])
+def test_lines_of_the_map_are_told_from_what_lies_under_them_in_the_sun(name: str):
+    """At least 3 to 1 (WCAG 2, 1.4.11) on bare ground, on free ground, on ground that keeps the clearance, and lines of a drive also on its corridor."""
+    table = _colours(name)
+    grounds = [table[one] for one in ("ground", "free", "kept")]
+    opacity = re.search(
+        r'"fill-color": colour.corridor, "fill-opacity": ([\d.]+)',
+        (PAGE / "map" / "style.js").read_text("utf-8"),
+    )
+    assert opacity is not None
+    share = float(opacity.group(1))
+    covered = [
+        [share * c + (1 - share) * g for c, g in zip(table["corridor"], ground, strict=True)]
+        for ground in grounds
+    ]
+    lines = set(table) - {"ground", "free", "kept", "grid", "gridMain", "halo", "roverEdge"}
+    assert {
+        "keeps",
+        "near",
+        "breaks",
+        "extrapolated",
+        "track",
+        "fence",
+        "exclusion",
+        "corridor",
+        "draft",
+    } <= lines
+    for line in lines:
+        under = grounds if line in ("corridor", "hatch") else [*grounds, *covered]
+        assert min(_contrast(table[line], one) for one in under) >= 3.0, line
+    for word in ("text", "fence", "exclusion"):  # names have a halo
+        assert _contrast(table[word], table["halo"]) >= 4.5
+
+
+def test_files_that_the_server_does_not_take_are_not_sent():
+    text = (PAGE / "actions.js").read_text(encoding="utf-8")
+    assert re.search(r"MOST_BYTES = (\d+) \* 1024 \* 1024;", text).group(1) == str(wire.MOST_BYTES // 1024**2)
 
 
 @pytest.mark.parametrize("folder", VENDORS, ids=("page", "tests"))

@@ -10,6 +10,7 @@ from director.test_bridge_director import FAR, NEAR, conductor, driving, ready
 from mavlink_bridge.director import EventName, State
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.rover import Mode
+from mavlink_bridge.simulator.faults import Faults
 from missions.request import Tour
 
 
@@ -127,6 +128,78 @@ def test_without_permission_the_word_does_nothing():
     run.director.start_drive(run.now_s)
     wait(run, 2.0)
     assert run.director.state is State.VERIFIED
+
+
+def arming():
+    """A start at the moment when the rover is armed, and not in AUTO yet."""
+    run = conductor(
+        faults=Faults(latency_s=0.1), arm=True, starts_on_word=True
+    )  # else AUTO is on its way at once
+    run.run_until(lambda: run.director.state is State.READY, 30)
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 30)
+    run.director.start_drive(run.now_s)
+    run.run_until(lambda: run.vehicles[0].is_armed, 20)
+    assert run.director.state is State.STARTING
+    return run
+
+
+def said_armed(run) -> list:
+    return [event for event in run.events if event.name is EventName.LEFT_ARMED]
+
+
+@pytest.mark.parametrize("how", ["withheld", "held", "told another target"])
+def test_a_rover_that_was_armed_for_a_drive_that_did_not_begin_is_told_of_until_it_is_disarmed(how):
+    run = arming()
+    assert not run.director.is_left_armed
+    if how == "withheld":
+        run.director.withhold_drive(run.now_s)
+    elif how == "held":
+        run.director.hold("asked for", run.now_s)
+    else:
+        run.director.take_target(NEAR, run.now_s)
+    wait(run, 10.0)
+    assert held(run)
+    assert run.director.is_left_armed
+    (told,) = said_armed(run)  # once
+    assert "stands armed in HOLD" in told.text
+    run.vehicles[0].rover.is_armed = False  # by the transmitter
+    wait(run, 3.0)
+    assert not run.director.is_left_armed
+    assert len(said_armed(run)) == 1
+
+
+def test_a_rover_that_was_armed_and_is_started_again_drives_and_nothing_more_is_said_of_it():
+    run = arming()
+    run.director.withhold_drive(run.now_s)
+    wait(run, 4.0)
+    assert run.director.is_left_armed
+    run.director.start_drive(run.now_s)
+    run.run_until(lambda: run.director.state is State.DRIVING, 20)
+    assert not run.director.is_left_armed
+    run.director.hold("asked for", run.now_s)  # who stops a drive knows that it is armed
+    wait(run, 10.0)
+    assert held(run)
+    assert not run.director.is_left_armed
+    assert len(said_armed(run)) == 1
+
+
+def test_a_rover_that_somebody_else_drives_or_that_was_armed_before_is_not_told_of():
+    run = arming()
+    run.director.withhold_drive(run.now_s)
+    wait(run, 4.0)
+    run.vehicles[0].rover.mode = Mode.MANUAL
+    wait(run, 3.0)
+    run.vehicles[0].rover.mode = Mode.HOLD
+    wait(run, 3.0)
+    assert not run.director.is_left_armed
+    run = ready(conductor(arm=True, starts_on_word=True))  # armed by its operator
+    run.director.take_target(FAR, run.now_s)
+    run.run_until(lambda: run.director.state is State.VERIFIED, 30)
+    run.director.start_drive(run.now_s)
+    run.director.withhold_drive(run.now_s)
+    wait(run, 5.0)
+    assert not said_armed(run)
 
 
 def test_a_request_of_a_page_takes_the_place_of_the_orders_own():

@@ -99,6 +99,24 @@ def test_less_than_was_asked_needs_a_word() -> None:
     assert not any("--accept-less" in text for text in (*less.warnings, *widest.warnings, *widest.info))
 
 
+def test_a_refusal_that_is_not_compared_names_what_straight_legs_keep_and_looks_for_nothing_to_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = replace(THROUGH, clearance_m=4.53)
+    with pytest.raises(NoRouteError, match="the widest keeps") as compared:
+        plan(gate(), asked)
+    monkeypatch.setattr(PromisedRoute, "widest", None)  # that would take as long as several plans
+    with pytest.raises(
+        NoRouteError,
+        match=r"no route keeps 4\.53 m; along straight legs the widest keeps \d\.\d\d m, narrowest between",
+    ) as caught:
+        plan(gate(), asked, compares=False)
+    assert "widest_m" not in caught.value.details
+    assert caught.value.details["widest_drawn_m"] == compared.value.details["widest_drawn_m"]
+    with pytest.raises(NoRouteError, match="along straight legs the widest keeps"):
+        plan(gate(), Tour(start=THROUGH.start, targets=(THROUGH.target,), clearance_m=4.53), compares=False)
+
+
 def test_a_target_too_near_a_fence_is_reached_with_less_where_less_is_accepted() -> None:
     near = GoTo(start=place(-50, 0), target=place(-4, 30), clearance_m=2.0)
     with pytest.raises(TargetBlockedError, match=r"closer than 2 m while driving|closer than 2 m"):

@@ -27,8 +27,6 @@ export class Pointing {
     this.store = store;
     this.act = act;
     this.handles = new Handles(view);
-    /** @type {Place[]} */
-    this.drawn = [];
     const { map } = view;
     map.on("mousemove", (event) => this.hover([event.lngLat.lng, event.lngLat.lat], event.point));
     map.on("mouseout", () => store.state.hoverLeg !== null && store.set({ hoverLeg: null }));
@@ -38,7 +36,16 @@ export class Pointing {
     map.on("click", (event) => this.click([event.lngLat.lng, event.lngLat.lat], event.point));
     map.getCanvas().addEventListener("keydown", (event) => this.press(event));
     map.doubleClickZoom.disable();
-    view.whenReady(() => store.watch(["doc", "plan", "zone", "tool"], (state) => this.show(state)));
+    view.whenReady(() => store.watch(["doc", "plan", "zone", "tool", "drawn"], (state) => this.show(state)));
+  }
+
+  /** The corners of what is being drawn. */
+  get drawn() {
+    return this.store.state.drawn;
+  }
+
+  set drawn(drawn) {
+    this.store.set({ drawn });
   }
 
   /**
@@ -140,7 +147,7 @@ export class Pointing {
   /** @param {PageState} state */
   show(state) {
     const isDrawing = state.tool === "polygon" || state.tool === "circle";
-    if (!isDrawing) {
+    if (!isDrawing && state.drawn.length > 0) {
       this.drawn = [];
     }
     this.view.map.getCanvas().style.cursor = state.tool === "none" ? "" : "crosshair";

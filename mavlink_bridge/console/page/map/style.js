@@ -10,16 +10,16 @@ import { letterScale } from "../dom.js";
 const LIGHT = {
   ground: "#f4f5f0", grid: "#c9cdc2", gridMain: "#a8aea0", text: "#14181c", halo: "#ffffff",
   fence: "#8a5a00", free: "#ffffff", kept: "#d8efe4", exclusion: "#7a1f1f", hatch: "#a33b3b",
-  keeps: "#005ea8", near: "#9a6700", breaks: "#b3001b", extrapolated: "#6d3fa0", plain: "#44505c",
-  corridor: "#3b8fd4", track: "#1d1d1f", rover: "#0b57d0", roverEdge: "#ffffff", target: "#00664f", draft: "#a3006d",
+  keeps: "#005ea8", near: "#8f5d00", breaks: "#b3001b", extrapolated: "#6d3fa0", plain: "#44505c",
+  corridor: "#2f7ec2", track: "#1d1d1f", rover: "#0b57d0", roverEdge: "#ffffff", target: "#00664f", draft: "#a3006d",
   manual: "#8a5a00", held: "#b3001b",
 };
 const DARK = {
   ground: "#14181c", grid: "#2b323a", gridMain: "#3f4852", text: "#f1f4f6", halo: "#0b0e11",
-  fence: "#f0b440", free: "#1d242b", kept: "#173a2f", exclusion: "#ff9a8f", hatch: "#c9584f",
-  keeps: "#62b5ff", near: "#ffc94d", breaks: "#ff6f66", extrapolated: "#cf9bff", plain: "#b4bfca",
+  fence: "#f0b440", free: "#1d242b", kept: "#173a2f", exclusion: "#ff9a8f", hatch: "#d2665d",
+  keeps: "#62b5ff", near: "#ffc94d", breaks: "#ff7b72", extrapolated: "#cf9bff", plain: "#b4bfca",
   corridor: "#4a9fe8", track: "#f5f5f5", rover: "#8ec5ff", roverEdge: "#0b0e11", target: "#4fe0b5", draft: "#ff7ccf",
-  manual: "#f0b440", held: "#ff6f66",
+  manual: "#f0b440", held: "#ff7b72",
 };
 
 /** @typedef {typeof LIGHT} Colours */
@@ -110,7 +110,7 @@ function route(colour) {
   });
   return [
     { id: "corridor", type: "fill", source: "corridor", paint: { "fill-color": colour.corridor, "fill-opacity": 0.28 } },
-    { id: "corridor-edge", type: "line", source: "corridor", paint: { "line-color": colour.corridor, "line-width": 1 } },
+    { id: "corridor-edge", type: "line", source: "corridor", paint: { "line-color": colour.corridor, "line-width": 1.5 } },
     { id: "blocks", type: "line", source: "lines", filter: ["==", ["get", "name"], ""], paint: { "line-color": colour.plain, "line-width": 0.7 } },
     { id: "lines", type: "line", source: "lines", filter: ["!=", ["get", "name"], ""], paint: { "line-color": colour.target, "line-width": 1.5, "line-dasharray": [5, 3] } },
     { id: "mission", type: "line", source: "mission", paint: { "line-color": colour.plain, "line-width": 2, "line-dasharray": [3, 2] } },

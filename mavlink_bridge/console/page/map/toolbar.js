@@ -1,7 +1,6 @@
 /** The tools on the map. */
 
-import { saveAs } from "../actions.js";
-import { h, svg } from "../dom.js";
+import { h, saveAs, svg } from "../dom.js";
 import { INSIDE, isServed } from "../inside.js";
 import { signButton } from "../panels/parts.js";
 import { texts } from "../texts.js";
@@ -32,8 +31,8 @@ export function toolbar(store, act, scene, view, pointing) {
   }, { "aria-expanded": "false" });
   const undo = signButton("undo", `${words.undo} (Ctrl+Z)`, () => act.undo());
   const redo = signButton("redo", `${words.redo} (Ctrl+Y)`, () => act.redo());
-  store.watch(["doc"], () => {
-    undo.disabled = act.history.past.length === 0;
+  store.watch(["doc", "drawn"], ({ drawn }) => {
+    undo.disabled = act.history.past.length === 0 && drawn.length === 0;
     redo.disabled = act.history.future.length === 0;
   });
   const finish = signButton("yes", words.finish, () => pointing.close());

@@ -1,11 +1,10 @@
 /** The fence: as the autopilot holds and means it, and as it is drawn here. */
 
-import { fill, h, say, show } from "../dom.js";
+import { fill, h, keepFocus, say, show } from "../dom.js";
 import { readPlace } from "../geo.js";
 import { isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { button, cannotWrite, notes, placeField, signButton } from "./parts.js";
-import { keepFocus } from "./plan.js";
 
 /** @typedef {import("../types.js").PageState} PageState */
 /** @typedef {import("../types.js").Zone} Zone */

@@ -1,7 +1,7 @@
 /** Files in and out, and the backups of what was on the vehicle. */
 
 import { get } from "../connection.js";
-import { fill, h, show } from "../dom.js";
+import { fill, h, keepFocus, show } from "../dom.js";
 import { refusal } from "../planner.js";
 import { texts } from "../texts.js";
 import { button, cannotWrite, confirmed, notes } from "./parts.js";
@@ -78,8 +78,8 @@ function backupsPart(store, act) {
     try {
       const backups = await get("/api/backups");
       const reason = cannotWrite(store.state);
-      fill(list, backups.map((/** @type {any} */ one) => h("li", {}, h("span", { class: "grow" }, one.name, h("br"), h("small", {}, `${one.what}, ${one.items} · ${new Date(one.time_s * 1000).toLocaleString("en-GB")} · ${one.vehicle}`)),
-        button(texts.files.restore, () => restore(one.name), { disabled: reason !== "" || !one.is_this_vehicle, title: reason || null, "aria-label": `${texts.files.restore} ${one.name}` }))));
+      keepFocus(list, () => fill(list, backups.map((/** @type {any} */ one) => h("li", {}, h("span", { class: "grow" }, one.name, h("br"), h("small", {}, `${one.what}, ${one.items} · ${new Date(one.time_s * 1000).toLocaleString("en-GB")} · ${one.vehicle}`)),
+        button(texts.files.restore, () => restore(one.name), { disabled: reason !== "" || !one.is_this_vehicle, title: reason || null, "aria-label": `${texts.files.restore} ${one.name}` })))));
       if (backups.length === 0) {
         fill(list, h("li", { class: "quiet" }, texts.files.noBackups));
       }

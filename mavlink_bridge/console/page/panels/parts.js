@@ -147,7 +147,7 @@ export function confirmed(question, yes) {
   return new Promise((resolve) => {
     const dialog = h("dialog", { "aria-label": question });
     const done = (/** @type {boolean} */ answer) => { dialog.close(); dialog.remove(); resolve(answer); };
-    fill(dialog, h("p", {}, question), h("div", { class: "row" }, button(yes, () => done(true), { class: "main" }), button(texts.cancel, () => done(false))));
+    fill(dialog, h("p", {}, question), h("div", { class: "row" }, button(yes, () => done(true), { class: "main" }), button(texts.cancel, () => done(false), { autofocus: true })));
     dialog.addEventListener("cancel", () => done(false));
     document.body.append(dialog);
     dialog.showModal();

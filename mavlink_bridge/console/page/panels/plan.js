@@ -1,6 +1,6 @@
 /** The plan: what is asked for, and what comes of it. */
 
-import { fill, h, say, show } from "../dom.js";
+import { fill, h, keepFocus, say, show } from "../dom.js";
 import { INSIDE, isServed } from "../inside.js";
 import { texts } from "../texts.js";
 import { legTable } from "./legs.js";
@@ -70,19 +70,6 @@ function targetsPart(store, act) {
 }
 
 /**
- * Build a list anew and leave the focus where it was in it.
- * @param {HTMLElement} list
- * @param {() => void} build
- */
-export function keepFocus(list, build) {
-  const focused = list.contains(document.activeElement) ? document.activeElement?.getAttribute("aria-label") : null;
-  build();
-  if (focused) {
-    /** @type {HTMLElement | null} */ (list.querySelector(`[aria-label="${CSS.escape(focused)}"]`))?.focus();
-  }
-}
-
-/**
  * @param {PageStore} store
  * @param {Actions} act
  */
@@ -126,7 +113,7 @@ function resultPart(store, act) {
     show(busy, isPlanning);
     say(working, doc.mission ? texts.plan.checking : texts.plan.working);
   });
-  store.watch(["plan", "planTrouble", "doc", "isPlanning"], (state) => {
+  store.watch(["plan", "planTrouble", "doc", "isPlanning"], (state) => keepFocus(card, () => {
     const { plan, planTrouble, isPlanning } = state;
     // What is shown while a newer question is being answered is no answer to it.
     show(card, true);
@@ -146,7 +133,7 @@ function resultPart(store, act) {
       fill(card, h("p", {}, isServed ? (isEmpty ? texts.plan.nothing : texts.plan.cancelled) : texts.plan.nothingHere),
         !isEmpty && button(texts.plan.again, () => act.planner.change(true)));
     }
-  });
+  }));
   return section;
 }
 
@@ -215,9 +202,10 @@ function noRoute(why, act) {
   const metres = widest ? Math.floor(widest.clearance_m * 100 + 1e-6) / 100 : 0;
   return [
     h("strong", { class: "headline" }, `✗ ${texts.noRoute.title}`), h("p", {}, why.message), why.advice && h("p", {}, why.advice),
-    widest && h("p", {}, texts.noRoute.widest(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`),
+    // What only straight legs keep stands in the message, where it is room that is missing.
+    widest && (widest.is_driven ? h("p", {}, texts.noRoute.widest(widest.clearance_m), widest.between.length > 0 && ` ${texts.noRoute.between(widest.between)}`) : h("p", {}, texts.noRoute.widestDrawn)),
     why.blockers.length > 0 && h("p", {}, `${texts.noRoute.blockers}: ${why.blockers.map((one) => one.name).join(", ")}`),
-    isServed && widest && metres > 0 && button(texts.noRoute.take(metres), () => act.setClearance(metres), { class: "main" }),
+    isServed && widest && metres > 0 && (widest.is_driven ? button(texts.noRoute.take(metres), () => act.setClearance(metres), { class: "main" }) : button(texts.noRoute.takeWidest, () => act.askWidest(), { class: "main" })),
   ];
 }
 

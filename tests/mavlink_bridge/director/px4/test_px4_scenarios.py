@@ -76,6 +76,7 @@ CANNOT = {
     "test_home_again_and_an_end_are_asked_of_the_bridge_too": "a mission that ends with RTL is refused (test_px4_gaps)",
     "test_a_target_across_a_seam_of_a_union_is_refused_with_what_would_do": "there is no union of inclusions",
     "test_the_mode_of_a_disarmed_vehicle_is_left_alone": _ROVER,
+    "test_a_rover_that_somebody_else_drives_or_that_was_armed_before_is_not_told_of": _ROVER,
     "test_a_disarmed_vehicle_that_somebody_left_in_auto_is_told_of": _ROVER,
     "test_disarmed_between_the_look_and_the_switch_it_is_put_back_to_hold": _ROLLS,
     "test_over_a_bad_link_too": "a change of mode shows in the next heartbeat only, a second apart: at a loss of 25 % HOLD may go unconfirmed, and is said so",

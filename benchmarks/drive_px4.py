@@ -1,6 +1,6 @@
 """Whether missions planned for a PX4 rover are driven as promised: the fields of `drive.py`, the simulated PX4 rover, in stepped time.
 
-``python benchmarks/drive_px4.py [--fields N] [--first SEED] [--jobs N] [--lines FILE]``. Each field is planned for steered wheels at 1, 2 and 3 m/s, and for skid steering, which was
+``python benchmarks/drive_px4.py [--firmware VERSION] [--fields N] [--first SEED] [--jobs N] [--lines FILE]``. Each field is planned for steered wheels at 1, 2 and 3 m/s, and for skid steering, which was
 not measured: it is planned with the drive model trusted, and counted apart. The simulated rover's law was written apart from the drive model. Each run is kept as a line of JSON
 in the file that ``--lines`` names; started again with it, seeds that stand in it are not run again.
 """
@@ -15,6 +15,7 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 
 TOLERANCE_M = 0.15
 STANDS_S = 60.0
-FIRMWARE = Firmware(1, 18, 0, 0)
+FIRMWARES = {"1.17": Firmware(1, 17, 0), "1.18": Firmware(1, 18, 0, 0)}
 AIRFRAME = {
     "CA_AIRFRAME": 5.0,
     "NAV_ACC_RAD": 0.5,
@@ -73,15 +74,15 @@ VEHICLES = {
 }
 
 
-def runs_of(seed: int) -> list[Run]:
+def runs_of(seed: int, firmware: Firmware) -> list[Run]:
     """Plan and drive one field with each vehicle."""
     field = make_field(seed)
-    return [_run(field, name, AIRFRAME | changes) for name, changes in VEHICLES.items()]
+    return [_run(field, name, AIRFRAME | changes, firmware) for name, changes in VEHICLES.items()]
 
 
-def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
+def _run(field: Field, name: str, parameters: dict[str, float], firmware: Firmware) -> Run:
     begun_s = time.process_time()
-    situation = situation_of(field, parameters, FIRMWARE)
+    situation = situation_of(field, parameters, firmware)
     is_skid = parameters["CA_AIRFRAME"] == VEHICLES["skid, 2 m/s (not measured)"]["CA_AIRFRAME"]
     request = GoTo(target=field.target, clearance_m=field.clearance_m, trusts_model=is_skid)
     known = {"seed": field.seed, "kind": field.kind, "vehicle": name, "widest_m": math.nan}
@@ -93,7 +94,7 @@ def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
     if planned.clearance_m is None:
         found = Run(**known, promised_m=field.clearance_m, extrapolated=planned.extrapolated)  # type: ignore[arg-type]
         return replace(found, cpu_s=time.process_time() - begun_s)
-    driven_s, driven_m, arrived = _drive(field, planned, parameters)
+    driven_s, driven_m, arrived = _drive(field, planned, parameters, firmware)
     return Run(
         **known,  # type: ignore[arg-type]
         promised_m=planned.clearance_m,
@@ -108,7 +109,9 @@ def _run(field: Field, name: str, parameters: dict[str, float]) -> Run:
     )
 
 
-def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[float, float, bool]:
+def _drive(
+    field: Field, planned: Plan, parameters: dict[str, float], firmware: Firmware
+) -> tuple[float, float, bool]:
     """Drive a plan to its end, or much longer than foreseen; return the time, the least clearance, and whether it arrived.
 
     The rover has no fence of its own: PX4 holds 64 items, and it would stop the rover where the promise is broken.
@@ -120,7 +123,7 @@ def _drive(field: Field, planned: Plan, parameters: dict[str, float]) -> tuple[f
             heading_deg=field.heading_deg,
             mission=planned.items,
             parameters=parameters,
-            firmware=FIRMWARE,
+            firmware=firmware,
             streams=False,
         )
     )
@@ -168,6 +171,7 @@ def report(runs: list[Run]) -> str:
 def main() -> None:
     """Run the benchmark and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--firmware", choices=FIRMWARES, default="1.18")
     parser.add_argument("--fields", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
@@ -177,12 +181,12 @@ def main() -> None:
     done = {run.seed for run in runs}
     seeds = [seed for seed in range(options.first, options.first + options.fields) if seed not in done]
     with ProcessPoolExecutor(options.jobs) as pool:
-        for found in pool.map(runs_of, seeds):
+        for found in pool.map(partial(runs_of, firmware=FIRMWARES[options.firmware]), seeds):
             runs += found
             if options.lines:
                 with options.lines.open("a", encoding="utf-8") as file:
                     file.writelines(json.dumps(asdict(run)) + "\n" for run in found)
-    print(report(runs))
+    print(f"PX4 {options.firmware}: {report(runs)}")
 
 
 if __name__ == "__main__":

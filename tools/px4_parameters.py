@@ -2,7 +2,8 @@
 
 Each FOLDER is a checkout of PX4-Autopilot at a version, oldest first. Without git in it, its file COMMITS says of which commit each file is, a line
 ``path<TAB>commit`` each. Only the parameters of `missions.vehicle.parameters` are taken: type, range and default, from module.yaml, \\*_params.yaml and
-\\*_params.c, of the newest version that has them.
+\\*_params.c, of the newest version that has them; where 1.17 has it, also with its file and commit there. What differs between versions is written to the
+error output.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from typing import NamedTuple
 import yaml
 
 from missions.vehicle.parameters import PX4_NAMES
+
+RELEASE = "1.17"
+"""The version that was measured as a release."""
 
 ROOT = Path(__file__).parents[1]
 TABLE = ROOT / "tests" / "missions" / "vehicle" / "data" / "px4_parameters.csv"
@@ -35,6 +39,8 @@ class Row(NamedTuple):
     last: str
     file: str
     commit: str
+    file_1_17: str = ""
+    commit_1_17: str = ""
 
 
 def found_in(folder: Path, version: str, names: set[str]) -> dict[str, Row]:
@@ -95,7 +101,9 @@ def main(arguments: list[str]) -> None:
             before = rows.get(name)
             if before is not None and before[1:5] != row[1:5]:
                 sys.stderr.write(f"{name}: {before[1:5]} in {before.last}, {row[1:5]} in {version}\n")
-            rows[name] = row
+            released = row if version == RELEASE else before
+            named = released is not None and released.last == RELEASE
+            rows[name] = row._replace(file_1_17=released.file, commit_1_17=released.commit) if named else row
     missing = sorted(set(PX4_NAMES) - set(rows))
     if missing:
         raise SystemExit(f"not found: {', '.join(missing)}")

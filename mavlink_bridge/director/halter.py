@@ -313,7 +313,8 @@ class Halter(Part):
             core.voice.tell(
                 now_s, EventName.COMMAND_FAILED, text, stopping.command_name, stopping.result_name
             )
-        return [Notice.HOLD_ENDED]
+        is_unseen = stopping.is_granted and stopping.is_blind
+        return [Notice.HELD_UNSEEN if is_unseen else Notice.HOLD_ENDED]
 
     def is_mode_known(self, now_s: float) -> bool:
         """Return whether the newest heartbeat is news of the mode that the vehicle is in."""

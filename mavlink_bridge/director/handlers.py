@@ -262,6 +262,14 @@ def _on_taken_unseen(parts: Parts, _now_s: float) -> Iterable[Signal]:
     return [Cue.TAKEN_OVER]
 
 
+def _on_held_unseen(parts: Parts, _now_s: float) -> Iterable[Signal]:
+    """Drive nothing on from a HOLD that may have overridden somebody: it stands, and who wants it to drive gives a target."""
+    if not parts.core.heeds(Cue.TAKEN_OVER) or parts.core.state is State.ARRIVED:
+        return [Notice.HOLD_ENDED]
+    parts.hand_over.taken = Takeover(parts.core.modes.hold, is_unseen=True)
+    return [Cue.TAKEN_OVER]
+
+
 def _on_hold_ended(parts: Parts, _now_s: float) -> Iterable[Signal]:
     if parts.core.state is State.HOLDING and not parts.halter.is_hold_granted:
         parts.caller.not_held()
@@ -363,6 +371,7 @@ HANDLERS: dict[Signal, Callable[[Parts, float], Iterable[Signal] | None]] = {
     Notice.LEARNING_FAILED: _learn_again,
     Notice.HOLD_ASKED: _on_hold_asked,
     Notice.HOLD_ENDED: _on_hold_ended,
+    Notice.HELD_UNSEEN: _on_held_unseen,
     Notice.SWITCHED_BACK: _on_taken_unseen,
     Notice.DRIVEN_IN_HOLD: _on_taken_unseen,
     Notice.MISSION_INVALID: _on_mission_invalid,

@@ -11,18 +11,18 @@ from mavlink_bridge.director.core import Core, Part
 from mavlink_bridge.director.events import EventName
 from mavlink_bridge.director.halter import STILL_MPS
 from mavlink_bridge.director.states import ON_VEHICLE, Cue, Notice, Signal, State
-from mavlink_bridge.director.steps import Step, step
+from mavlink_bridge.director.steps import step
 from mavlink_bridge.errors import OutcomeError, RefusedError
 from mavlink_bridge.mavlink import messages as m
 from mavlink_bridge.mavlink.drive_rules import FirstItem
 from mavlink_bridge.protocol.command import SendCommand
 from mavlink_bridge.protocol.first_item import BeginAtFirstItem
-from mavlink_bridge.protocol.mode_switch import AwaitHeartbeat, ModeSwitch
+from mavlink_bridge.protocol.mode_switch import Arming, AwaitHeartbeat, ModeSwitch, SeenCommand
 from mavlink_bridge.protocol.standstill import AwaitStandstill
 from missions.items import Command
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from mavlink_bridge.director.adopter import Adopter
     from mavlink_bridge.director.drive_supervisor import DriveSupervisor
@@ -181,8 +181,9 @@ class Starter(Part):
         if not found.holds and (found.moved_m > _MOVED_M or self._desk.is_stale):
             return self._desk.broke(found, now_s)
         if core.orders.arm and not situation.armed:
+            assert core.peer is not None
             self._armed_s, self._is_armed_told = now_s, False
-            core.steps.run([self._command(Command.COMPONENT_ARM_DISARM, self._armed)], now_s)
+            core.steps.run([step(Arming(core.peer), self._armed)], now_s)
         else:
             self._go_off(now_s)
         return []
@@ -217,9 +218,9 @@ class Starter(Part):
         self.core.voice.error(now_s, EventName.TROUBLE, trouble, dict(trouble.details))
         return self.core.fail_step(trouble)
 
-    def _armed(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
-        if not _is_accepted(machine):
-            return self._refused(machine, now_s)
+    def _armed(self, machine: Arming, now_s: float) -> Sequence[Signal]:
+        if not machine.is_granted:
+            return self._not_granted(machine, now_s)
         if self.core.situation.mode == self.core.modes.hold:
             self._go_off(now_s)
         else:  # a heartbeat from before our HOLD, overtaken on the way, or an operator: the next one tells which
@@ -264,18 +265,22 @@ class Starter(Part):
     def _in_auto(self, machine: ModeSwitch, now_s: float) -> Sequence[Signal]:
         if machine.is_left:
             self._adopter.forget()
-            self._tell_failed("DO_SET_MODE", machine.result_name, machine.texts, now_s)
+            self._tell_failed(machine.command_name, machine.result_name, machine.texts, now_s)
             return [Notice.SWITCHED_BACK]
         if not machine.is_granted:
             self._driver.stand_by()
-            return self._failed("DO_SET_MODE", machine.result_name, "", now_s)
+            return self._not_granted(machine, now_s)
         self._armed_s = None
         self.core.operator.settle(now_s)
         if self._first_item is not FirstItem.BY_COMMAND_IN_MISSION:
             return [Cue.STARTED]
+        core = self.core
+        assert core.peer is not None
         # Only after the mode change: before it, in HOLD, ArduPilot reports internal errors.
-        first = self._command(Command.DO_SET_MISSION_CURRENT, self._started, param2=1.0)
-        self.core.steps.run([first], now_s)
+        first = m.CommandLong(
+            core.peer.system, core.peer.component, Command.DO_SET_MISSION_CURRENT, param1=1.0, param2=1.0
+        )
+        core.steps.run([step(SendCommand(core.peer, first), self._started)], now_s)
         return []
 
     def _started(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
@@ -285,32 +290,24 @@ class Starter(Part):
         self._halter.command_hold(now_s)  # it drives from an item that we do not know
         return signals
 
-    def _command(
-        self,
-        number: Command,
-        take: Callable[[SendCommand, float], Sequence[Signal]],
-        param2: float = 0.0,
-    ) -> Step:
-        peer = self.core.peer
-        assert peer is not None
-        message = m.CommandLong(peer.system, peer.component, number, param1=1.0, param2=param2)
-        return step(SendCommand(peer, message), take)
-
     def _refused(self, machine: SendCommand, now_s: float) -> Sequence[Signal]:
         outcome = machine.outcome
         assert outcome is not None
         result = outcome.result.name if outcome.result is not None else "no answer"
-        texts = "".join(f"; {text}" for text in outcome.texts)
-        return self._failed(Command(outcome.command).name, result, texts, now_s)
+        return self._failed(Command(outcome.command).name, result, outcome.texts, now_s)
 
-    def _failed(self, name: str, result: str, texts: str, now_s: float) -> Sequence[Signal]:
+    def _not_granted(self, machine: SeenCommand, now_s: float) -> Sequence[Signal]:
+        return self._failed(machine.command_name, machine.result_name, machine.texts, now_s)
+
+    def _failed(self, name: str, result: str, texts: tuple[str, ...], now_s: float) -> Sequence[Signal]:
         self.is_told = False
         self.core.steps.clear()
         self._adopter.forget()
         self._tell_failed(name, result, (), now_s)
         kind = OutcomeError if result == "no answer" else RefusedError
+        why = "".join(f"; {text}" for text in texts)
         return self.core.fail_step(
-            kind(f"the mission is on the vehicle, but it refused {name}: {result}{texts}")
+            kind(f"the mission is on the vehicle, but it refused {name}: {result}{why}")
         )
 
     def _tell_failed(self, name: str, result: str, texts: tuple[str, ...], now_s: float) -> None:

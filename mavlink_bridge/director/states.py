@@ -91,6 +91,7 @@ class Notice(StrEnum):
     GONE_ON = auto()  # on the route, as far as was better than a HOLD at once
     HOLD_ASKED = auto()  # by a person at a page of ours, who has let go of everything else with it
     HOLD_ENDED = auto()  # taken, or not
+    HELD_UNSEEN = auto()  # taken, and whoever took the vehicle before that was not seen
     SWITCHED_BACK = auto()  # the vehicle accepted AUTO, and is in another mode
     DRIVEN_IN_HOLD = auto()  # somebody sends the vehicle to a place in the mode that stops
     MISSION_INVALID = auto()  # the vehicle does not drive our mission any more, and holds

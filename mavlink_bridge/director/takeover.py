@@ -36,11 +36,14 @@ class Takeover:
         System and component whose command was overheard; None: the vehicle's heartbeat tells of it.
     shows_failsafe : bool
         Whether that heartbeat says MAV_STATE_CRITICAL.
+    is_unseen : bool
+        Whether nobody knows that there was one: our HOLD was said again while nothing was heard of the vehicle, and would have undone it.
     """
 
     mode: int | None
     asker: tuple[int, int] | None = None
     shows_failsafe: bool = False
+    is_unseen: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,9 @@ def account_of(takeover: Takeover, cause: Cause | None, heard: Cause | None, mod
     if takeover.asker is not None:
         who = f"system {takeover.asker[0]} component {takeover.asker[1]}"
         return Account(f"{who} {_done(takeover, modes)}", Doer.GROUND_STATION, who)
+    if takeover.is_unseen:
+        text = "HOLD was said again while nothing was heard of the vehicle, so that whoever took it meanwhile was overridden"
+        return Account(text, Doer.UNKNOWN, None)
     if cause is not None:
         return Account(
             f"the autopilot {_done(takeover, modes)} itself: {cause.reason}", Doer.AUTOPILOT, cause.reason

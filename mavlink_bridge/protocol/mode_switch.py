@@ -1,16 +1,19 @@
-"""Switching the vehicle's mode, and nothing against what it tells meanwhile.
+"""Switching the vehicle's mode, or arming it, and nothing against what it tells meanwhile.
 
-DO_SET_MODE may be lost, and so may its COMMAND_ACK; which mode the vehicle is in its HEARTBEAT tells for certain. HOLD is urgent: it is sent
-again every half second. Any other mode is sent again only after a heartbeat that shows the vehicle where it was when we asked. Nothing is sent again
-once it was accepted, for what is shown afterwards is somebody else's doing, also where ACCEPTED alone does not tell that the vehicle is in the mode (PX4
-1.17). Only HOLD is: it sets nothing going, and the answer may be that to a command of ours before.
+The command may be lost, and so may its COMMAND_ACK; what the vehicle did its HEARTBEAT tells for certain. One comes each second, and an operator may act
+between two of them, so they are asked for until the answer is known. HOLD is urgent: it is sent again every half second. Anything else is sent again only
+after a heartbeat that shows the vehicle as it was when we asked, and not where none was heard for so long before that it may have been done and undone.
+Nothing is sent again once it was accepted, for what is shown afterwards is somebody else's doing, also where ACCEPTED alone does not tell that the vehicle is
+in the mode (PX4 1.17). Only HOLD is: it sets nothing going, and the answer may be that to a command of ours before.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult
+from mavlink_bridge.mavlink.messages import CommandAck, CommandLong, Heartbeat, MavResult, ModeFlag
 from mavlink_bridge.protocol.table_machine import Outbox, TableMachine
 from mavlink_bridge.protocol.texts import Reasons
 from mavlink_bridge.protocol.transitions import (
@@ -23,6 +26,8 @@ from mavlink_bridge.protocol.transitions import (
 from missions.items import Command
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
@@ -30,6 +35,15 @@ _HURRY_S = 0.5  # HOLD is sent again without waiting for heartbeats; chosen, not
 _PATIENCE_S = 8.0  # for a heartbeat: of one a second seven may be lost; chosen, not measured
 _SETTLE_S = 0.5
 """A heartbeat that comes sooner after a command may have been sent before it."""
+
+_SETTLE_STOP_S = 0.25  # a HOLD too many does no harm; chosen, not measured
+
+ASK_S = 0.1
+"""So often a heartbeat is asked for while it is not known what became of a command: sooner than a person answers what a vehicle does. Chosen."""
+
+_MOST_ASKS = 8  # after each command, for about a second: then the next heartbeat comes unasked
+_LONGEST_UNSEEN_S = 1.0
+"""Longer without a heartbeat, what we asked for may have been done and undone by somebody. Chosen: eight heartbeats were asked for by then."""
 
 _SHOWN_BEFORE_S = 1.5
 """A heartbeat that comes sooner after the answer may have been sent before it, as the director takes it, too; chosen, not measured."""
@@ -39,35 +53,54 @@ _MOST_S = 60.0  # 16 sends at a heartbeat a second take 16 s; where heartbeats a
 _HEARTBEAT_ID = 0.0
 
 
-class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
-    """Switches to a mode.
+class SeenCommand(TableMachine[SwitchState, SwitchEvent]):
+    """A command whose effect the vehicle's heartbeats show.
 
     Parameters
     ----------
     peer : Peer
         The vehicle and our identity.
-    mode : int
-        HEARTBEAT.custom_mode, one of the peer's autopilot.
+    command : CommandLong
+        What is sent; its ``confirmation`` is counted up.
+    table : mapping
+        Its transitions.
+    is_stop : bool
+        Whether it sets nothing going: then it is said again also after it was accepted.
     is_urgent : bool
         Send it again every half second until it is answered.
-    until_seen : bool
-        Send it again until a heartbeat shows it: the answer may be that to another command.
+
+    Attributes
+    ----------
+    is_blind : bool
+        Whether it was said again while no heartbeat told what had become of it: who has switched the vehicle meanwhile was overridden, and nobody knows.
     """
 
-    command_name = "DO_SET_MODE"
-
-    def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
-        only_seen = MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH_BY_HEARTBEAT
-        answer_counts = peer.autopilot.modes.answer_counts and not until_seen
-        super().__init__(MODE_SWITCH if answer_counts else only_seen, SwitchState.IDLE)
+    def __init__(
+        self,
+        peer: Peer,
+        command: CommandLong,
+        table: Mapping[SwitchState, Mapping[SwitchEvent, SwitchState]],
+        *,
+        is_stop: bool,
+        is_urgent: bool = False,
+    ) -> None:
+        super().__init__(table, SwitchState.IDLE)
+        self.is_blind = False
         self._peer = peer
-        self._mode = mode
+        self._command = command
+        self._is_stop = is_stop
         self._is_urgent = is_urgent
-        self._sends = 0
+        self._sends = self._asks = 0
         self._sent_s = self._answered_s = 0.0
+        self._heard_s = -math.inf
         self._give_up_s = 0.0
         self._result: MavResult | None = None
         self._reasons = Reasons(peer)
+
+    @property
+    def command_name(self) -> str:
+        """Its MAV_CMD."""
+        return Command(self._command.command).name
 
     @property
     def is_granted(self) -> bool:
@@ -81,7 +114,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
 
     @property
     def is_left(self) -> bool:
-        """Whether the vehicle said yes, and its heartbeat shows another mode: it was not available, or somebody has switched it since."""
+        """Whether the vehicle is shown otherwise, though it said yes or may have done it unseen: it was not available, or somebody has undone it since."""
         return self.state is SwitchState.LEFT
 
     @property
@@ -106,7 +139,7 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         """When `handle_timer` wants to be called."""
         if self.is_done or self.state is SwitchState.IDLE:
             return None
-        return min(self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S), self._give_up_s)
+        return min(self._silence_s, self._ask_due_s, self._give_up_s)
 
     @property
     def bound_s(self) -> float:
@@ -127,31 +160,55 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
         message = frame.message
         self._reasons.take(frame, now_s)
         if isinstance(message, Heartbeat):
-            if message.custom_mode == self._mode:
+            if self._shows(message):
                 self._move(SwitchEvent.SEEN)
             else:
-                self._take_other_mode(now_s)
-        elif isinstance(message, CommandAck) and message.command == Command.DO_SET_MODE:
+                self._take_otherwise(now_s)
+        elif isinstance(message, CommandAck) and message.command == self._command.command:
             self._take_ack(message.result, now_s)
 
-    def _take_other_mode(self, now_s: float) -> None:
-        """Take a heartbeat that shows another mode: say it again, unless it was accepted and somebody may have switched it since."""
-        is_stop = self._mode == self._peer.autopilot.modes.hold
-        if self.state is SwitchState.ACCEPTED and not is_stop:
+    def _shows(self, heartbeat: Heartbeat) -> bool:
+        """Return whether a heartbeat shows that it was done."""
+        raise NotImplementedError
+
+    def _take_otherwise(self, now_s: float) -> None:
+        """Take a heartbeat that does not show it: say it again, unless it was accepted, or may have been done unseen, and somebody may have undone it since."""
+        unseen_s = now_s - max(self._sent_s, self._heard_s)
+        self._heard_s = now_s
+        if self.state is SwitchState.ACCEPTED and not self._is_stop:
             if now_s >= self._answered_s + _SHOWN_BEFORE_S:
                 self._move(SwitchEvent.LEFT)
-        elif now_s >= self._sent_s + _SETTLE_S:
+        elif now_s < self._sent_s + (_SETTLE_STOP_S if self._is_stop else _SETTLE_S):
+            return
+        elif self._is_stop or unseen_s <= _LONGEST_UNSEEN_S:
+            self.is_blind = False  # it is as it was: nothing of ours was done yet
             self._send_again(now_s)
+        else:
+            self._move(SwitchEvent.LEFT)
 
     def handle_timer(self, now_s: float) -> None:
         """Take notice that time has passed."""
         deadline_s = self.deadline_s
         if deadline_s is None or now_s < deadline_s:
             return
-        if self._may_send_blindly and now_s < self._give_up_s:
+        if now_s < min(self._silence_s, self._give_up_s):
+            self._asks += 1
+            self._send(ask_for_heartbeat(self._peer))
+        elif self._may_send_blindly and now_s < self._give_up_s:
+            self.is_blind = self.is_blind or self._heard_s < self._sent_s + ASK_S
+            self._send(ask_for_heartbeat(self._peer))  # it is answered before the command is done
             self._send_again(now_s)
         else:
             self._move(SwitchEvent.SILENCE)
+
+    @property
+    def _silence_s(self) -> float:
+        """When nothing was heard for so long that something is to be done."""
+        return self._sent_s + (_HURRY_S if self._may_send_blindly else _PATIENCE_S)
+
+    @property
+    def _ask_due_s(self) -> float:
+        return self._sent_s + ASK_S * (self._asks + 1) if self._asks < _MOST_ASKS else math.inf
 
     @property
     def _may_send_blindly(self) -> bool:
@@ -173,9 +230,55 @@ class ModeSwitch(TableMachine[SwitchState, SwitchEvent]):
             self._move(SwitchEvent.SILENCE)
 
     def _send_once(self, now_s: float) -> None:
-        self._send(set_mode(self._peer, self._mode, self._sends))
+        self._send(replace(self._command, confirmation=self._sends))
         self._sends += 1
+        self._asks = 0
         self._sent_s = now_s
+
+
+class ModeSwitch(SeenCommand):
+    """Switches to a mode.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    mode : int
+        HEARTBEAT.custom_mode, one of the peer's autopilot.
+    is_urgent : bool
+        Send it again every half second until it is answered.
+    until_seen : bool
+        Send it again until a heartbeat shows it: the answer may be that to another command.
+    """
+
+    def __init__(self, peer: Peer, mode: int, *, is_urgent: bool = False, until_seen: bool = False) -> None:
+        modes = peer.autopilot.modes
+        only_seen = MODE_SWITCH_UNTIL_SEEN if until_seen else MODE_SWITCH_BY_HEARTBEAT
+        table = MODE_SWITCH if modes.answer_counts and not until_seen else only_seen
+        super().__init__(
+            peer, set_mode(peer, mode, 0), table, is_stop=mode == modes.hold, is_urgent=is_urgent
+        )
+        self._mode = mode
+
+    def _shows(self, heartbeat: Heartbeat) -> bool:
+        return heartbeat.custom_mode == self._mode
+
+
+class Arming(SeenCommand):
+    """Arms the vehicle.
+
+    Parameters
+    ----------
+    peer : Peer
+        The vehicle and our identity.
+    """
+
+    def __init__(self, peer: Peer) -> None:
+        command = CommandLong(peer.system, peer.component, Command.COMPONENT_ARM_DISARM, param1=1.0)
+        super().__init__(peer, command, MODE_SWITCH, is_stop=False)
+
+    def _shows(self, heartbeat: Heartbeat) -> bool:
+        return bool(heartbeat.base_mode & ModeFlag.SAFETY_ARMED)
 
 
 def set_mode(peer: Peer, mode: int, confirmation: int) -> CommandLong:

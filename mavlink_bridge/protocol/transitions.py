@@ -421,7 +421,7 @@ class SwitchState(StrEnum):
     ACCEPTED = auto()
     SEEN = auto()
     REFUSED = auto()
-    LEFT = auto()  # accepted, and shown is another mode
+    LEFT = auto()  # accepted, or done unseen for all that is known, and shown is something else
     UNANSWERED = auto()
 
 
@@ -442,6 +442,7 @@ MODE_SWITCH: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
         SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
         SwitchEvent.REFUSED: SwitchState.REFUSED,
         SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.LEFT: SwitchState.LEFT,
         SwitchEvent.SILENCE: SwitchState.UNANSWERED,
     },
 }
@@ -450,6 +451,7 @@ MODE_SWITCH_UNTIL_SEEN: dict[SwitchState, dict[SwitchEvent, SwitchState]] = {
     SwitchState.SENT: {
         SwitchEvent.ACCEPTED: SwitchState.ACCEPTED,
         SwitchEvent.SEEN: SwitchState.SEEN,
+        SwitchEvent.LEFT: SwitchState.LEFT,
         SwitchEvent.SILENCE: SwitchState.UNANSWERED,
     },
     SwitchState.ACCEPTED: {

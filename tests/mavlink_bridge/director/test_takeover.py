@@ -553,14 +553,16 @@ def test_the_heartbeat_before_the_drive_is_asked_for():
     assert run.run_until(lambda: Mode.AUTO in modes_sent(run), 5) - verified_s <= 0.2
 
 
-def test_hold_is_sent_again_each_half_second_until_it_is_answered():
+def test_hold_is_sent_again_each_half_second_until_it_is_answered_and_once_a_heartbeat_shows_that_it_was_lost():
     run = driving(conductor())
     wait(run, 6)
     run.up.push = lambda _frame, _now_s: None
     begun = len(run.sent)
     run.director.take_target(NEAR, run.now_s)
     wait(run, 1.9)
-    assert modes_sent(run, begun) == [Mode.HOLD] * 4
+    sent = modes_sent(run, begun)
+    assert set(sent) == {Mode.HOLD}
+    assert 4 <= len(sent) <= 6  # a heartbeat comes each second
 
 
 def test_a_heartbeat_that_was_overtaken_is_no_takeover():

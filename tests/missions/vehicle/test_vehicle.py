@@ -449,6 +449,8 @@ def test_the_table_is_as_px4_published_it(row: dict[str, str]) -> None:
     if found.default is not None and found.name not in NOT_SET:
         assert found.default == pytest.approx(float(row["default"]), abs=1e-6)
     assert len(row["commit"]) == 40
+    is_in_1_17 = row["last"] != "1.15"
+    assert (len(row["commit_1_17"]), bool(row["file_1_17"])) == ((40, True) if is_in_1_17 else (0, False))
 
 
 def test_all_of_px4s_that_is_read_is_published_and_asked_for() -> None:

@@ -277,7 +277,7 @@ class TestHoldNearAFence:
     def test_it_goes_on_first_where_the_loop_would_leave(self, firmware):
         """A zone beside the route, and one across it farther on: the loop of a HOLD at once would lead into the first."""
         run = driving(conductor(rover(firmware, parameters={"RO_SPEED_LIM": 3.0})))
-        wait(run, 8.5)
+        wait(run, 9.3)
         pose = run.director.situation.pose.value
         east, north = (one / pose.speed_mps for one in pose.velocity_mps)
         beside = placed(pose.position, 4.0 * east + 3.3 * north, 4.0 * north - 3.3 * east)

@@ -3,8 +3,8 @@
 ``python benchmarks/calibration.py [--samples 2400 8000 18000] [--kept-back 2000] [--corners 20000] [--drives 200] [--circle 2.6] [--jobs 2] [--lines FILE] [-o FILE]``. Drives of
 ten corners each (20 to 135 degrees, legs of 12 to 40 m, 2 m/s) are simulated in stepped time; the vehicle's own positions, five a second, go through the grading of `pbpp log` and
 the classes of `pbpp logs calibrate`, with so many corners to calibrate by. Then counted: of corners kept back those within the calibrated bounds (by the vehicle's own positions and
-by the true ones), the bound against the 99 % quantile of all corners, and drives whose true track left the calibrated corridor by more than 0.10 m. ``--lines`` keeps each drive;
-started again it goes on.
+by the true ones), the bound against the 99 % quantile of all corners, and drives whose true track left the calibrated corridor by more than 0.10 m; at last, how many corners a class
+needs until its bound is near that quantile, by samples drawn from all. ``--lines`` keeps each drive; started again it goes on.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from mavlink_bridge.dataset.calibrate import NEARLY, corner_classes, leg_classes
+from mavlink_bridge.dataset.calibrate import NEARLY, corner_classes, leg_classes, ranks_of_bounds
 from mavlink_bridge.logbook.grade import DriveGrader, GradedField, way_of
 from mavlink_bridge.logbook.track import TrackFix
 from mavlink_bridge.mavlink.rover import Mode
@@ -54,6 +54,9 @@ PARAMETERS = {
 CORNERS = 10
 EVERY_TICKS = 10  # five positions a second
 ALLOWED_M = 0.10
+NEAR = 1.3
+"""A bound is wanted no farther out than so many times the 99 % quantile."""
+DRAWS = 1000
 
 
 def line(seed: int) -> list[tuple[float, float]]:
@@ -253,6 +256,7 @@ def main() -> None:
         parts.append(f"{count} drives to calibrate by:")
         parts.append("\n".join(classes(calibration, every)))
         parts.append("\n".join([*kept_back(calibration, back), *driven_anew(calibration, fresh)]))
+    parts.append("\n".join(needed(every)))
     parts.append(f"{time.process_time() - begun_s:.0f} CPU s in this process")
     text = "\n\n".join(parts) + "\n"
     print(text)
@@ -287,6 +291,31 @@ def classes(calibration: Calibration, every: list[dict]) -> Iterator[str]:
             bound = float(np.quantile(everything[f"{name}_bound"][these], 0.99)) + more_m
             cells.append(f"{bound:.2f} / {q99:.2f} = {bound / q99:.2f}")
         yield f"| {' | '.join(cells)} |"
+
+
+def needed(every: list[dict]) -> Iterator[str]:
+    """Yield how far out bounds are by the number of corners of a class, of samples drawn from all corners of it."""
+    everything = columns(every, "own")
+    turns = np.array([turn_class(turn) for turn in everything["turn_deg"]])
+    rng = np.random.default_rng(1)
+    yield f"| corners of the class | bound / 99 %: median, 95 % of {DRAWS} samples, of the worst class | samples of the worst class with at most {NEAR} |"
+    yield "|---|---|---|"
+    for count in (300, 473, 773, 1000, 1500, 2000, 3000):
+        ratios = []
+        for turn in np.unique(turns):
+            these = turns == turn
+            if these.sum() < 1000:  # a stray corner beside the classes that are driven
+                continue
+            for name, side, rank in zip(
+                ("cut", "overshoot"), ("inside_m", "outside_m"), ranks_of_bounds(count), strict=True
+            ):
+                drawn = rng.choice(everything[side][these], (DRAWS, count))
+                more_m = np.partition(drawn, rank - 1, axis=1)[:, rank - 1]
+                bound_m = np.quantile(everything[f"{name}_bound"][these], 0.99) + more_m
+                ratios.append(bound_m / np.quantile(everything[name][these], 0.99))
+        worst = [max(float(np.quantile(ratio, share)) for ratio in ratios) for share in (0.5, 0.95)]
+        least = min(float((ratio <= NEAR).mean()) for ratio in ratios)
+        yield f"| {count} | {worst[0]:.2f}, {worst[1]:.2f} | {least:.1%} |"
 
 
 def kept_back(calibration: Calibration, back: list[dict]) -> Iterator[str]:

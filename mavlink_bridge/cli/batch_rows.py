@@ -6,7 +6,7 @@ import codecs
 import csv
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from mavlink_bridge.cli.options.plan import PlanOptions
 
 Row = Mapping[str, Any]
+RowError = MissionFormatError | UsageError
 
 COLUMNS = (
     "name", "fence", "start", "target", "vehicle", "clearance", "corner_allowance", "snap", "speed", "method", "home", "output",
@@ -31,36 +32,48 @@ _MOST_LINE = 10_000  # characters, of which the names of the columns are in a fe
 _SUFFIXES = (".csv", ".jsonl", ".ndjson", ".parquet")
 
 
-def read_rows(path: Path) -> Iterator[Row]:
-    """Return a table's rows, as they are needed.
+def read_rows(path: Path) -> Iterator[Row | RowError]:
+    """Return a table's rows, as they are needed; of a row that says nothing that could be planned, why.
 
     Raises
     ------
     MissionFormatError, OSError
-        The table, or a line of it, cannot be read.
+        The table cannot be read, or not beyond a line.
     UsageError
-        It is of another kind, or has a column that rows do not have.
+        It is of another kind, or its first line names a column that rows do not have.
     """
     kind = path.suffix.lower()
     if kind not in _SUFFIXES:
         raise UsageError(f"--batch {path}: expected a table ({', '.join(_SUFFIXES)})")
-    rows: Iterator[Row] = {".csv": _csv_rows, ".parquet": read_parquet}.get(kind, _json_rows)(path)
+    rows: Iterator[Row | RowError] = {".csv": _csv_rows, ".parquet": _parquet_rows}.get(kind, _json_rows)(
+        path
+    )
     outputs: dict[str, int] = {}
     for number, row in enumerate(rows, start=1):
-        if unknown := [name for name in row if name not in COLUMNS]:
-            raise UsageError(
-                f"{path}: row {number}: unknown column {', '.join(map(repr, unknown))}; columns are {', '.join(COLUMNS)}"
-            )
-        output = str(row.get("output") or "").strip()
-        place = os.path.normcase(os.path.normpath(path.parent / output))
-        if output and outputs.setdefault(place, number) != number:
-            raise UsageError(
-                f"{path}: row {number}: output {output!r} is that of row {outputs[place]} too: one plan would overwrite the other"
-            )
-        yield row
+        trouble = row if isinstance(row, Exception) else _trouble(path, number, row, outputs)
+        yield row if trouble is None else trouble
 
 
-def _csv_rows(path: Path) -> Iterator[Row]:
+def _trouble(path: Path, number: int, row: Row, outputs: dict[str, int]) -> UsageError | None:
+    """Return why a row is not planned; note its output."""
+    if unknown := _unknown(row):
+        return UsageError(f"{path}: row {number}: {unknown}")
+    output = str(row.get("output") or "").strip()
+    place = os.path.normcase(os.path.normpath(path.parent / output))
+    if output and outputs.setdefault(place, number) != number:
+        return UsageError(
+            f"{path}: row {number}: output {output!r} is that of row {outputs[place]} too: one plan would overwrite the other"
+        )
+    return None
+
+
+def _unknown(names: Iterable[str]) -> str:
+    """Return what to say of columns that rows do not have; nothing where there are none."""
+    unknown = ", ".join(repr(name) for name in names if name not in COLUMNS)
+    return f"unknown column {unknown}; columns are {', '.join(COLUMNS)}" if unknown else ""
+
+
+def _csv_rows(path: Path) -> Iterator[Row | RowError]:
     with path.open("rb") as head:
         is_utf16 = head.read(2) in (
             codecs.BOM_UTF16_LE,
@@ -78,14 +91,13 @@ def _csv_rows(path: Path) -> Iterator[Row]:
                 )
             if twice := sorted({name for name in names if names.count(name) > 1}):
                 raise UsageError(f"{path}: column {twice[0]!r} appears twice")
+            if unknown := _unknown(names):
+                raise UsageError(f"{path}: {unknown}")
             for row in reader:
                 if None in row:
-                    raise MissionFormatError(
-                        f"{path}: line {reader.line_num}: more cells than the {len(names)} columns",
-                        file=str(path),
-                        line=reader.line_num,
-                    )
-                yield {name.strip(): value for name, value in row.items()}
+                    yield _unreadable(path, reader.line_num, f"more cells than the {len(names)} columns")
+                else:
+                    yield {name.strip(): value for name, value in row.items()}
         except UnicodeError:
             raise MissionFormatError(
                 f"{path} is not a text file; expected UTF-8", file=str(path), advice="save it as CSV in UTF-8"
@@ -94,7 +106,14 @@ def _csv_rows(path: Path) -> Iterator[Row]:
             raise MissionFormatError(f"{path}: line {reader.line_num}: {error}", file=str(path)) from None
 
 
-def _json_rows(path: Path) -> Iterator[Row]:
+def _parquet_rows(path: Path) -> Iterator[Row]:
+    for row in read_parquet(path):
+        if unknown := _unknown(row):
+            raise UsageError(f"{path}: {unknown}")
+        yield row
+
+
+def _json_rows(path: Path) -> Iterator[Row | RowError]:
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
             if not line.strip():
@@ -102,14 +121,13 @@ def _json_rows(path: Path) -> Iterator[Row]:
             try:
                 row = json.loads(line, object_pairs_hook=_object)
             except (ValueError, RecursionError) as error:
-                raise MissionFormatError(
-                    f"{path}: line {number}: not JSON: {error}", file=str(path)
-                ) from None
-            if not isinstance(row, dict):
-                raise MissionFormatError(
-                    f"{path}: line {number}: expected an object", file=str(path), line=number
-                )
-            yield row
+                yield _unreadable(path, number, f"not JSON: {error}")
+            else:
+                yield row if isinstance(row, dict) else _unreadable(path, number, "expected an object")
+
+
+def _unreadable(path: Path, line: int, why: str) -> MissionFormatError:
+    return MissionFormatError(f"{path}: line {line}: {why}", file=str(path), line=line)
 
 
 def _object(pairs: list[tuple[str, Any]]) -> Row:

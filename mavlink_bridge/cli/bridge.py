@@ -17,7 +17,7 @@ from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.failing import Level, exit_code_of, telling
-from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
+from mavlink_bridge.cli.interrupting import AtHand, interruptible
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.cli.live import BackupKeeper, PlanMaker, WaysMaker, director_at_hand
@@ -88,8 +88,7 @@ def bridge(options: BridgeOptions) -> None:
         log_of_run = RunLog(recorder, journal) if recorder is not None and journal is not None else None
         tell = SafeTeller(tell, lambda: director.state not in AT_WORK)
         shell = BridgeShell(director, options.connect, tell, view, log_of_run)
-        with terminable():
-            shell.run(signing_of(options.signing_key), options.timeout)
+        shell.run(signing_of(options.signing_key), options.timeout)
     trouble = shell.director.trouble
     if trouble is not None and shell.director.is_done:
         if options.json_output:

@@ -24,6 +24,7 @@ from mavlink_bridge.cli.failing import (
     telling,
 )
 from mavlink_bridge.cli.terminal import say
+from mavlink_bridge.cli.terminating import terminable
 from missions import errors as mission_errors
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ def command_of(name: str) -> Callable[..., None]:
         options = kind(**{option: value for option, value in given.items() if value is not None})
         begin_telling(name, verbose=options.verbose, quiet=options.quiet, options=options)
         try:
-            getattr(import_module(f"mavlink_bridge.cli.{name}"), name)(options)
+            with terminable():
+                getattr(import_module(f"mavlink_bridge.cli.{name}"), name)(options)
         except (mission_errors.MissionError, bridge_errors.BridgeError) as error:
             raise typer.Exit(report_error(name, error, wants_json=options.json_output)) from None
         except KeyboardInterrupt as interrupt:

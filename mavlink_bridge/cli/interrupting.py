@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.terminal import say
+from mavlink_bridge.cli.terminating import Terminated
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import now_s
 from mavlink_bridge.protocol.mode_switch import ModeSwitch
@@ -33,10 +34,6 @@ _LISTEN_S = 1.5
 """Without a question: for so long the vehicle is listened to, so that what is reported of it is true now. A heartbeat comes every second."""
 
 _OLD_S = 2.0  # two heartbeats: older telemetry is shown with its age
-
-
-class Terminated(KeyboardInterrupt):
-    """SIGTERM, SIGHUP, or Ctrl-Break on Windows: the end without a person at the keyboard."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -301,26 +298,3 @@ def _heed_no_more() -> None:
     """Let no further Ctrl-C spoil the last message."""
     with contextlib.suppress(ValueError):  # not the main thread: no signals come here
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _terminate(_number: int, _frame: object) -> None:
-    raise Terminated
-
-
-@contextlib.contextmanager
-def terminable() -> Iterator[None]:
-    """Let SIGTERM, a terminal that is closed (SIGHUP), on Windows Ctrl-Break, end what runs in the context as an interrupt does: with a word of what the vehicle does."""
-    before: dict[int, Any] = {}
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # what SIGINT does is put back at the end
-    for number in (getattr(signal, name) for name in names if hasattr(signal, name)):
-        before[number] = signal.getsignal(number)
-        is_ignored = before[number] is signal.SIG_IGN  # by nohup
-        if number != signal.SIGINT and not is_ignored:
-            with contextlib.suppress(ValueError):  # not the main thread
-                signal.signal(number, _terminate)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            if handler is not None and signal.getsignal(number) is not handler:
-                signal.signal(number, handler)

@@ -17,7 +17,7 @@ from mavlink_bridge.backup.vehicle_lock import VehicleLock
 from mavlink_bridge.backup.vehicle_mark import VehicleMark
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.drawing import progress_bar
-from mavlink_bridge.cli.interrupting import AtHand, interruptible, terminable
+from mavlink_bridge.cli.interrupting import AtHand, interruptible
 from mavlink_bridge.cli.link_notes import tell_echoes
 from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.session import signing_of
@@ -100,7 +100,7 @@ def plan_live(
         What went wrong, on the link or in planning.
     """
     identity = orders.identity or ONE_SHOT_IDENTITY
-    with terminable(), open_link(connection, identity, signing=signing_of(key_file)) as link:
+    with open_link(connection, identity, signing=signing_of(key_file)) as link:
         return conduct(
             link,
             orders,

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -32,7 +32,7 @@ from missions.formats import check_writable_format
 from missions.words import counted
 
 if TYPE_CHECKING:
-    from mavlink_bridge.cli.batch_rows import Row
+    from mavlink_bridge.cli.batch_rows import Row, RowError
     from mavlink_bridge.cli.options.plan import PlanOptions
 
 _ALONE = (
@@ -45,10 +45,10 @@ _SUFFIXES = (".jsonl", ".parquet")
 
 @dataclass(frozen=True, slots=True)
 class AskedPlan:
-    """What one row asks: the row, the command's options, the table's folder, and the files that are read, as they are named there."""
+    """What one row asks: the row (or why it asks nothing), the command's options, the table's folder, and the files that are read, as they are named there."""
 
     number: int
-    row: Row
+    row: Row | RowError
     options: PlanOptions
     folder: Path
     files: tuple[Path, ...]
@@ -96,6 +96,8 @@ def plan_batch(options: PlanOptions, table: Path) -> None:
 def plan_task(task: Task[AskedPlan]) -> Planned:
     """Make one row's plan, on a worker: nothing is printed or written there."""
     asked = task.asked
+    if isinstance(asked.row, Exception):
+        raise asked.row
     places = dict(zip(asked.files, task.files, strict=True))
     options = options_of(asked.row, asked.options, asked.folder)
     if options.fence is None:
@@ -154,7 +156,7 @@ def _documents(options: PlanOptions, table: Path, codes: Counter[ExitCode]) -> I
             asked = done.task.asked
             document: dict[str, object] = {
                 "row": asked.number,
-                "name": asked.row.get("name"),
+                "name": None if isinstance(asked.row, Exception) else asked.row.get("name"),
                 "fence_file": _named(asked, "fence"),
                 "vehicle_file": _named(asked, "vehicle"),
             }
@@ -182,16 +184,17 @@ def _documents(options: PlanOptions, table: Path, codes: Counter[ExitCode]) -> I
 
 
 def _named(asked: AskedPlan, column: str) -> str | None:
-    value = asked.row.get(column) or getattr(asked.options, column)
+    said = None if isinstance(asked.row, Exception) else asked.row.get(column)
+    value = said or getattr(asked.options, column)
     return None if value is None else str(value)
 
 
-def _task(number: int, row: Row, options: PlanOptions, folder: Path) -> Task[AskedPlan]:
-    try:
-        mine = options_of(row, options, folder)
-        files = files_of(mine.fence, mine.vehicle)
-    except UsageError:  # which the task itself will raise
-        files = ()
+def _task(number: int, row: Row | RowError, options: PlanOptions, folder: Path) -> Task[AskedPlan]:
+    files: tuple[Path, ...] = ()
+    with suppress(UsageError):  # which the task itself will raise
+        if not isinstance(row, Exception):
+            mine = options_of(row, options, folder)
+            files = files_of(mine.fence, mine.vehicle)
     return Task(AskedPlan(number, row, replace(options, output=[]), folder, files), files)
 
 

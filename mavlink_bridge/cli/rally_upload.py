@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mavlink_bridge.backup.store import BackupStore
 from mavlink_bridge.cli.common import warn
-from mavlink_bridge.cli.interrupting import interruptible, terminable
+from mavlink_bridge.cli.interrupting import interruptible
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import interrupted_warnings
 from mavlink_bridge.cli.starting import make_ready
@@ -31,7 +31,7 @@ def upload_rally(options: RallyOptions, choice: RallyChoice) -> None:
     assert options.connect is not None
     items = rally_to_items(RallyPoint(*place) for place in choice.points)
     store = BackupStore()
-    with terminable(), session_for(options, options.connect) as (session, show):
+    with session_for(options, options.connect) as (session, show):
         uploads = Uploads(session, store, replace_active=False)
         with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
             warn(interrupted_warnings(store, uploads.vehicle))

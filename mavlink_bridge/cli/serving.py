@@ -19,7 +19,6 @@ from mavlink_bridge.cli.bridge import BridgeShell, target_sources, teller
 from mavlink_bridge.cli.common import inform, warn
 from mavlink_bridge.cli.demo import demo_rover
 from mavlink_bridge.cli.field_files import read_fence_file
-from mavlink_bridge.cli.interrupting import terminable
 from mavlink_bridge.cli.plan_request import request_from_options
 from mavlink_bridge.cli.recording import open_recording
 from mavlink_bridge.cli.run_log import RunLog, SafeTeller
@@ -239,8 +238,7 @@ def _served_live(options: ServeOptions, request: Request) -> None:
         shell.show_on(console, writer)
         hub = stack.enter_context(served(options, source, name, backend, {}))
         console.serve(hub, desk)
-        with terminable():
-            shell.run(signing_of(options.signing_key), options.timeout)
+        shell.run(signing_of(options.signing_key), options.timeout)
 
 
 def _orders(options: ServeOptions, request: Request) -> Orders:

@@ -9,7 +9,7 @@ from mavlink_bridge.backup.store import BackupStore, read_backup
 from mavlink_bridge.cli.common import warn
 from mavlink_bridge.cli.enforcing import Enforcement
 from mavlink_bridge.cli.field_files import read_file, read_vehicle_file
-from mavlink_bridge.cli.interrupting import interruptible, terminable
+from mavlink_bridge.cli.interrupting import interruptible
 from mavlink_bridge.cli.options.upload import LISTS
 from mavlink_bridge.cli.options_session import session_for
 from mavlink_bridge.cli.restoring import Restoration, backups_to_restore, interrupted_warnings
@@ -51,7 +51,7 @@ def upload(options: UploadOptions) -> None:
     if options.forget:
         _forget(store, options)
         return
-    with terminable(), session_for(options, options.connect) as (session, show):
+    with session_for(options, options.connect) as (session, show):
         uploads = Uploads(session, store, replace_active=options.replace_active)
         with interruptible(session.at_hand(show.aside, uploads.on_it)), uploads.begin():
             backups = backups_to_restore(store, uploads.vehicle, restoration) if restoration else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -105,31 +106,34 @@ def build(
     DatasetError
         The dataset is of another version, or there is no DuckDB.
     """
-    database = dataset.begin()
-    progress = Progress(files=len(paths))
-    known = _Known(dataset, database)
-    batch = _Batch()
-    for done in workers.results(read_rows, _tasks(paths, known, batch, progress, show), in_order=False):
-        found = done.value if done.error is None else [_lost(mark, done.error) for mark in done.task.asked]
-        for log in found or ():
-            batch.add(log, is_new=known.take(log))
-            progress.read += 1
-            progress.size_bytes += log.file.size_bytes
-            if log.problem is not None:
-                progress.bad.append((log.file.path, log.problem))
-        show(progress)
-        if batch.logs >= _A_BATCH:
+    with dataset.readable(), closing(dataset):
+        database = dataset.begin()
+        progress = Progress(files=len(paths))
+        known = _Known(dataset, database)
+        batch = _Batch()
+        for done in workers.results(read_rows, _tasks(paths, known, batch, progress, show), in_order=False):
+            found = (
+                done.value if done.error is None else [_lost(mark, done.error) for mark in done.task.asked]
+            )
+            for log in found or ():
+                batch.add(log, is_new=known.take(log))
+                progress.read += 1
+                progress.size_bytes += log.file.size_bytes
+                if log.problem is not None:
+                    progress.bad.append((log.file.path, log.problem))
+            show(progress)
+            if batch.logs >= _A_BATCH:
+                dataset.stage(database, batch.rows)
+                batch = batch.emptied()
+                if dataset.staged_logs * _A_BATCH >= _A_LOAD:
+                    dataset.publish(database)
+        if batch.rows:
             dataset.stage(database, batch.rows)
-            batch = batch.emptied()
-            if dataset.staged_logs * _A_BATCH >= _A_LOAD:
-                dataset.publish(database)
-    if batch.rows:
-        dataset.stage(database, batch.rows)
-    superseded = known.superseded()
-    if dataset.staged_logs or superseded:
-        dataset.publish(database, superseded)
-    database.close()
-    dataset.end()
+        superseded = known.superseded()
+        if dataset.staged_logs or superseded:
+            dataset.publish(database, superseded)
+        database.close()
+        dataset.end()
     return progress
 
 

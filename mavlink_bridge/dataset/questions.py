@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from mavlink_bridge.dataset.store import words_of_duckdb
 from mavlink_bridge.errors import DatasetError
 from missions.picture.charts import Chart, Series
 from missions.vehicle.calibration import SPEED_STEP_MPS, TURN_STEP_DEG
 
 if TYPE_CHECKING:
     from mavlink_bridge.dataset.store import Dataset
+
+MOST_ROWS: Final = 1_000_000
+"""An answer has no more rows. Chosen: of one number each they take some 90 MB in Python; a query without an end would take all memory there is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,22 +177,29 @@ def ask_sql(dataset: Dataset, sql: str) -> AnswerRows:
 
 
 def _answer(dataset: Dataset, sql: str, values: dict[str, Any], *, is_users: bool = False) -> AnswerRows:
-    database = dataset.open()
-    try:
-        if is_users:
-            _check_only_reads(database, sql)
-        found = database.execute(sql, values) if values else database.execute(sql)
-        columns = tuple(str(one[0]) for one in found.description or ())
-        rows = tuple(found.fetchall())
-    except Exception as error:
-        if type(error).__module__.partition(".")[0] not in ("duckdb", "_duckdb"):
-            raise
-        text = " ".join(str(error).split())
+    with contextlib.closing(dataset.open()) as database:
+        try:
+            if is_users:
+                _check_only_reads(database, sql)
+            found = database.execute(sql, values) if values else database.execute(sql)
+            columns = tuple(str(one[0]) for one in found.description or ())
+            rows = tuple(found.fetchmany(MOST_ROWS + 1))
+        except Exception as error:
+            text = words_of_duckdb(error)
+            if text is None:
+                raise
+            if not is_users:
+                raise dataset.unreadable(text) from None
+            raise DatasetError(
+                f"the SQL is refused: {text}", sql=sql, advice="see docs/dataset.md for tables and views"
+            ) from None
+    if len(rows) > MOST_ROWS:
         raise DatasetError(
-            f"the SQL is refused: {text}", sql=sql, advice="see docs/dataset.md for tables and views"
-        ) from None
-    finally:
-        database.close()
+            f"the answer has more than {MOST_ROWS:,} rows",
+            sql=sql,
+            most=MOST_ROWS,
+            advice="ask for fewer: LIMIT, or sums by GROUP BY; DuckDB and Polars read the dataset's files themselves",
+        )
     return AnswerRows(columns, rows)
 
 

@@ -12,6 +12,7 @@ import math
 import os
 import secrets
 import shutil
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -69,6 +70,13 @@ def connection(scratch: Path | None = None) -> Any:  # noqa: ANN401 - duckdb has
         scratch.mkdir(parents=True, exist_ok=True)
         found.execute(f"SET temp_directory = {quoted(scratch)}")
     return found
+
+
+def words_of_duckdb(error: Exception) -> str | None:
+    """Return in one line what DuckDB says; None of another error."""
+    if type(error).__module__.partition(".")[0] not in ("duckdb", "_duckdb"):
+        return None
+    return " ".join(str(error).split())
 
 
 def quoted(text: object) -> str:
@@ -157,11 +165,13 @@ class Dataset:
                 folder=str(self.folder),
                 advice="build it: pbpp logs build FOLDER -o DATASET",
             )
+        self._check_files()
         found = connection()
-        for table in TABLES.values():
-            found.execute(f"CREATE VIEW {table.name} AS {self.select(table)}")
-        for view in VIEWS:
-            found.execute(f"CREATE VIEW {view.name} AS {view.sql}")
+        with self.readable():
+            for table in TABLES.values():
+                found.execute(f"CREATE VIEW {table.name} AS {self.select(table)}")
+            for view in VIEWS:
+                found.execute(f"CREATE VIEW {view.name} AS {view.sql}")
         allowed = ", ".join(
             quoted(one) for one in (self.folder, literal(self.folder))
         )  # as it is, and as it is asked for
@@ -169,6 +179,39 @@ class Dataset:
         found.execute("SET enable_external_access = false")
         found.execute("SET lock_configuration = true")
         return found
+
+    def _check_files(self) -> None:
+        """Refuse a dataset that was copied in part: rows that are gone would be missed by nobody.
+
+        Raises
+        ------
+        DatasetError
+            A file of its list is not there.
+        """
+        listed = [name for files in self._files.values() for name in files]
+        if missing := [name for name in listed if not (self.folder / name).is_file()]:
+            raise self.unreadable(
+                f"{len(missing)} of its {len(listed)} files are not there, such as {missing[0]}"
+            )
+
+    @contextmanager
+    def readable(self) -> Iterator[None]:
+        """Let what DuckDB cannot read or write of the dataset's files be an error of the dataset."""
+        try:
+            yield
+        except Exception as error:
+            text = words_of_duckdb(error)
+            if text is None:
+                raise
+            raise self.unreadable(text) from None
+
+    def unreadable(self, why: str) -> DatasetError:
+        """Return the error that a dataset is whose files cannot be used."""
+        return DatasetError(
+            f"{self.folder}: {why}",
+            folder=str(self.folder),
+            advice="copy the whole folder again, or build it anew in another one",
+        )
 
     def select(self, table: Table) -> str:
         """Return the query of all of a table's rows."""
@@ -211,6 +254,7 @@ class Dataset:
         self._lock = lock
         if self.is_there:
             self._read_list()  # as it is now: another build may have ended since
+            self._check_files()
         for name in (_INCOMING, _SCRATCH):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for folder in self._staged(every=True):
@@ -230,8 +274,12 @@ class Dataset:
         """Take away what a build needs only while it runs."""
         for name in (_INCOMING, _SCRATCH, _STAGING):
             shutil.rmtree(self.folder / name, ignore_errors=True)
+
+    def close(self) -> None:
+        """Let another build add to it."""
         if self._lock is not None:
             self._lock.close()
+            self._lock = None
 
     def _staged(self, *, every: bool = False) -> list[Path]:
         found = sorted((self.folder / _STAGING).glob("*"))

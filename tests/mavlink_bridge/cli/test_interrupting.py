@@ -24,13 +24,12 @@ from mavlink_bridge.cli.interrupting import (
     Interrupted,
     InterruptReport,
     Reaction,
-    Terminated,
     doing_text,
     first_reaction,
     interruptible,
     reaction_to,
-    terminable,
 )
+from mavlink_bridge.cli.terminating import Terminated, terminable
 from mavlink_bridge.errors import LinkError
 from mavlink_bridge.link import Link
 from mavlink_bridge.mavlink import messages as m

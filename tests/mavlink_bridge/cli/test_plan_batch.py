@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import duckdb
@@ -122,15 +126,11 @@ def test_json_lines_and_parquet_say_the_same(table):
     [
         ("a.csv", "fence,clearence\nx,2\n", "unknown column 'clearence'"),
         ("a.csv", "fence,start, start\nx,2,3\n", "column 'start' appears twice"),
-        ("a.jsonl", '{"start": "1,2", "start": "3,4"}\n', "a key appears twice"),
-        ("a.csv", "fence\nx,2\n", "a.csv: line 2: more cells than the 1 columns"),
         ("a.csv", b"fence\n\xff\n", "a.csv is not a text file; expected UTF-8"),
         ("a.csv", "fence\n".encode("utf-16-le"), "unknown column"),
         ("a.csv", "", "a.csv is empty; the first line names the columns"),
         ("a.csv", "\ufeff", "a.csv is empty; the first line names the columns"),
         ("a.csv", 'fence\n"x\n', "a.csv: line"),
-        ("a.jsonl", "{", "line 1: not JSON"),
-        ("a.jsonl", "\n[1]", "line 2: expected an object"),
         ("a.parquet", "no parquet", "a.parquet"),
         ("a.txt", "", "expected a table"),
     ],
@@ -142,6 +142,44 @@ def test_a_table_that_cannot_be_read_is_one_clear_error(tmp_path, monkeypatch, n
     assert result.exit_code in (2, 3)
     assert message in result.stderr
     assert [path.name for path in Path().iterdir()] == [name]
+
+
+@pytest.mark.parametrize(
+    ("name", "lines", "code", "message"),
+    [
+        ("a.jsonl", ["{GOOD}", '{"start": ', "{GOOD}"], 3, "a.jsonl: line 2: not JSON"),
+        ("a.jsonl", ["{GOOD}", "", "[1]", "{GOOD}"], 3, "a.jsonl: line 3: expected an object"),
+        ("a.jsonl", ["{GOOD}", '{"start": "1,2", "start": "3,4"}', "{GOOD}"], 3, "a key appears twice"),
+        ("a.jsonl", ["{GOOD}", "\udcff", "{GOOD}"], 3, "line 2: not JSON"),
+        ("a.jsonl", ["{GOOD}", "[" * 100_000, "{GOOD}"], 3, "line 2: not JSON"),
+        ("a.jsonl", ["{GOOD}", '{"clearence": 2}', "{GOOD}"], 2, "row 2: unknown column 'clearence'"),
+        (
+            "a.csv",
+            ["start,target", "{CELLS}", "1,2,3", "{CELLS}"],
+            3,
+            "a.csv: line 3: more cells than the 2 columns",
+        ),
+    ],
+)
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_row_that_cannot_be_read_is_its_own_error_and_the_rest_is_planned(
+    table, name, lines, code, message, jobs
+):
+    good = json.dumps({"start": HOME, "target": TARGET})
+    text = "\n".join(lines).replace("{GOOD}", good).replace("{CELLS}", f'"{HOME}","{TARGET}"')
+    Path(name).write_bytes(text.encode(errors="surrogateescape"))
+    files = ("--fence", "field/fence.waypoints", "--vehicle", "field/rover.parm")
+    result = run(name, "--jobs", jobs, *files)
+    assert result.exit_code == code
+    rows = told(result.stdout)
+    assert [(row["row"], row["status"], row["exit_code"]) for row in rows] == [
+        (1, "ok", 0),
+        (2, "error", code),
+        (3, "ok", 0),
+    ]
+    assert message in rows[1]["message"]
+    assert rows[1]["name"] is None
+    assert rows[0]["path"] == rows[2]["path"]
 
 
 @pytest.mark.parametrize(
@@ -200,22 +238,53 @@ def test_a_run_that_ends_early_leaves_what_was_there(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="SIGTERM")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_ended_by_a_signal_leaves_nothing(table, number):
+    with Path("field/plans.csv").open("a", encoding="utf-8") as file:
+        file.writelines(f'{name},fence.waypoints,"{HOME}","{TARGET}"\n' for name in range(1000))
+    words = [
+        "plan",
+        "--batch",
+        str(table),
+        "--home",
+        HOME,
+        "--jobs",
+        "2",
+        "-o",
+        "out.jsonl",
+        "-o",
+        "out.parquet",
+    ]
+    before = sorted(Path().rglob("*"))
+    with subprocess.Popen(
+        [sys.executable, "-m", "mavlink_bridge.cli", *words], stderr=subprocess.PIPE
+    ) as process:
+        while not any(path.stat().st_size for path in Path().glob(".pbpp-*/results.jsonl")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(number)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert b"error: interrupted" in told
+    assert [path for path in sorted(Path().rglob("*")) if path.name != "first.waypoints"] == before
+
+
 def test_no_plan_takes_anothers_place(tmp_path):
     table = tmp_path / "a.csv"
-    table.write_text("fence,output\na,one.waypoints\nb,\nc,\nd,one.waypoints\n")
-    rows = read_rows(table)
-    assert [next(rows)["fence"] for _ in range(3)] == ["a", "b", "c"]
-    with pytest.raises(UsageError, match=r"row 4: output 'one.waypoints' is that of row 1 too"):
-        next(rows)
     for spelt in (
+        "one.waypoints",
         "./one.waypoints",
         "sub/../one.waypoints",
         " one.waypoints",
         str(tmp_path / "one.waypoints"),
     ):
-        table.write_text(f"fence,output\na,one.waypoints\nb,{spelt}\n")
-        with pytest.raises(UsageError, match=r"row 2: output '.*one.waypoints' is that of row 1 too"):
-            list(read_rows(table))
+        table.write_text(f"fence,output\na,one.waypoints\nb,\nc,\nd,{spelt}\ne,\n")
+        *before, refused, after = read_rows(table)
+        assert [row["fence"] for row in (*before, after)] == ["a", "b", "c", "e"]
+        assert isinstance(refused, UsageError)
+        assert str(refused).startswith(f"{table}: row 4: output ")
+        assert "is that of row 1 too" in str(refused)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])

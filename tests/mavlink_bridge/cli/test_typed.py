@@ -16,9 +16,9 @@ from rich.console import Console
 
 from mavlink_bridge.cli.bridge_view import LiveView
 from mavlink_bridge.cli.failing import begin_telling
-from mavlink_bridge.cli.interrupting import terminable
 from mavlink_bridge.cli.keyboard import Keyboard
 from mavlink_bridge.cli.opening import Opening
+from mavlink_bridge.cli.terminating import terminable
 from mavlink_bridge.cli.typed import CONFIRM, TypedObstacle, understood
 from mavlink_bridge.director import Director, Orders, State
 from mavlink_bridge.director.orders import ObstacleSource

@@ -14,12 +14,14 @@ from typer.testing import CliRunner
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.dataset.build import build, log_files
 from mavlink_bridge.dataset.calibrate import (
+    Side,
     calibrate,
     calibration_text,
     corner_classes,
     leg_classes,
     more_m,
     rank_of_bound,
+    ranks_of_bounds,
 )
 from mavlink_bridge.dataset.schema import TABLES
 from mavlink_bridge.dataset.store import Dataset
@@ -55,18 +57,45 @@ def all_of(count):
 
 
 def test_any_sample_widens_and_few_do_not_narrow():
-    assert more_m(np.array([0.1234]), all_of(1), -1.0) == 0.124
-    assert more_m(np.full(299, -0.4), all_of(299), -1.0) == 0.0
-    assert more_m(np.full(300, -0.4), all_of(300), -1.0) == -0.4
-    assert more_m(np.full(300, -0.4), all_of(300), -0.1) == -0.1
-    assert more_m(np.full(300, -0.4), all_of(300), 0.0) == 0.0
+    assert more_m(np.array([0.1234]), all_of(1), -1.0, Side.INSIDE) == 0.124
+    assert more_m(np.full(299, -0.4), all_of(299), -1.0, Side.INSIDE) == 0.0
+    assert more_m(np.full(300, -0.4), all_of(300), -1.0, Side.INSIDE) == -0.4
+    assert more_m(np.full(300, -0.4), all_of(300), -0.1, Side.INSIDE) == -0.1
+    assert more_m(np.full(300, -0.4), all_of(300), 0.0, Side.INSIDE) == 0.0
 
 
 def test_what_may_not_narrow_widens():
     excess = np.concatenate((np.full(300, -0.4), [0.2]))
     tells = np.concatenate((all_of(300), [False]))
-    assert more_m(excess, tells, -1.0) == 0.2
-    assert more_m(-np.abs(excess), ~tells, -1.0) == 0.0  # one that tells, 300 that do not
+    assert more_m(excess, tells, -1.0, Side.INSIDE) == 0.2
+    assert more_m(-np.abs(excess), ~tells, -1.0, Side.INSIDE) == 0.0  # one that tells, 300 that do not
+
+
+def test_of_many_corners_one_in_a_hundred_may_exceed_the_bound_whoever_drove_it():
+    """A few corners that narrow nothing do not decide alone; those that may narrow have their own bound."""
+    excess = np.concatenate((np.full(1000, -0.4), np.full(2, 0.7)))
+    tells = excess < 0
+    assert more_m(excess, tells, -1.0, Side.INSIDE) == -0.4
+    assert more_m(np.append(excess, 0.7), np.append(tells, False), -1.0, Side.INSIDE) == 0.7
+    diluted = np.concatenate((np.full(300, 0.1), np.full(10_000, -0.4)))
+    assert more_m(diluted, np.arange(10_300) < 300, -1.0, Side.INSIDE) == 0.1
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.9])
+@pytest.mark.parametrize("count", [473, 1000, 2500])
+def test_both_bounds_together_hold_what_each_promises(count, alike):
+    """Of corners whose cut and overshoot have to do with each other, or not, 99 % are within both in 95 of 100 calibrations."""
+    rng = np.random.default_rng(7)
+    others = rng.normal(size=(20_000, 2))
+    others[:, 1] = alike * others[:, 0] + math.sqrt(1 - alike**2) * others[:, 1]
+    held = 0
+    for _ in range(400):
+        drawn = others[rng.integers(0, len(others), count)]
+        most = [np.sort(drawn[:, side])[rank - 1] for side, rank in enumerate(ranks_of_bounds(count))]
+        held += np.all(others <= most, axis=1).mean() >= 0.99
+    assert held / 400 > 0.93
+    assert ranks_of_bounds(300) == (300, 300)
+    assert ranks_of_bounds(473) == (473, 473)
 
 
 def test_corners_are_parted_into_classes():
@@ -185,6 +214,7 @@ def made_dataset(folder, logs, **other):
     dataset.publish(database)
     database.close()
     dataset.end()
+    dataset.close()
     return dataset
 
 

@@ -6,6 +6,7 @@ import gzip
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 
 from mavlink_bridge.cli.app import app
 from mavlink_bridge.dataset.build import build, log_files
+from mavlink_bridge.dataset.questions import ask_sql
 from mavlink_bridge.dataset.schema import TABLES, VIEWS
 from mavlink_bridge.dataset.store import Dataset
 from mavlink_bridge.errors import DatasetError
@@ -329,14 +331,58 @@ def test_what_is_no_dataset_is_refused(tmp_path):
         Dataset(tmp_path)
     with pytest.raises(DatasetError, match="there is no dataset"):
         Dataset(tmp_path / "none").open()
-    (tmp_path / "pbpp-dataset.json").write_text('{"schema": 99, "files": {}, "published": []}')
-    with pytest.raises(DatasetError, match="schema 99; this program reads and writes schema 2"):
-        Dataset(tmp_path)
+    for other in (1, 3, 99):
+        (tmp_path / "pbpp-dataset.json").write_text(f'{{"schema": {other}, "files": {{}}, "published": []}}')
+        with pytest.raises(DatasetError, match=f"schema {other}; this program reads and writes schema 2"):
+            Dataset(tmp_path)
     (tmp_path / "pbpp-dataset.json").write_text("[]")
     with pytest.raises(DatasetError, match="cannot be read"):
         Dataset(tmp_path)
     with pytest.raises(DatasetError, match="no such folder or file"):
         log_files([tmp_path / "nowhere"])
+
+
+@pytest.fixture
+def copied(place, tmp_path):
+    """A copy of the dataset."""
+    return Path(shutil.copytree(place / "dataset", tmp_path / "copy"))
+
+
+@pytest.mark.parametrize("table", ["positions", "files", "legs"])
+def test_a_dataset_that_was_copied_in_part_is_refused(place, copied, table):
+    """Else rows that are gone would be missed by nobody."""
+    shutil.rmtree(copied / table)
+    for words in (
+        ["ask", copied, "--sql", "SELECT 1 AS one"],
+        ["ask", copied, "modes"],
+        ["build", place / "logs", "-o", copied, "--jobs", "1"],
+        ["calibrate", copied, "-o", copied.parent / "rover.toml"],
+    ):
+        result = CliRunner().invoke(app, ["logs", *map(str, words)])
+        assert result.exit_code == 3
+        assert re.search(r"\d of its \d+ files are not there, such as " + table, result.stderr)
+        assert "copy the whole folder again" in result.stderr
+
+
+def test_files_that_were_cut_off_are_no_fault_of_the_program(place, copied):
+    for path in copied.rglob("*.parquet"):
+        path.write_bytes(path.read_bytes()[:-9])
+    for words in (
+        ["ask", copied, "--sql", "SELECT max(leg) FROM legs"],
+        ["ask", copied, "clearance"],
+        ["build", place / "logs", "-o", copied, "--jobs", "1"],
+        ["calibrate", copied, "-o", copied.parent / "rover.toml"],
+    ):
+        result = CliRunner().invoke(app, ["logs", *map(str, words)])
+        assert (result.exit_code, "internal error" in result.stderr) == (3, False)
+        assert "copy the whole folder again" in result.stderr
+
+
+def test_an_answer_without_an_end_is_refused(place):
+    with pytest.raises(DatasetError, match="more than 1,000,000 rows") as caught:
+        ask_sql(Dataset(place / "dataset"), "SELECT * FROM range(1000000000000)")
+    assert "LIMIT" in caught.value.details["advice"]
+    assert len(ask_sql(Dataset(place / "dataset"), "SELECT * FROM range(1000000)").rows) == 1_000_000
 
 
 def test_without_duckdb_the_command_to_install_it_is_told(place, monkeypatch):
@@ -361,6 +407,7 @@ def test_two_builds_at_once_do_not_mix(tmp_path, logs):
         second.begin()
     database.close()
     first.end()
+    first.close()
     with open_workers(1) as workers:
         build(first, log_files([logs / "mission-yard.tlog"]), workers)
         found = build(

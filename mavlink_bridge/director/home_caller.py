@@ -213,7 +213,7 @@ class HomeCaller(Part):
         """Report once that this RTL is the second one, which is not answered: who pressed it may wait for a route."""
         if now_s > self._second_s + SAME_PRESS_S:
             name = self.core.modes.words(mode)
-            text = f"second {name}: left to you, it drives straight home"
+            text = f"second {name} is yours: drives straight home"
             why = "the second one: the vehicle is left to the operator"
             self.core.voice.tell(now_s, EventName.CALL_IGNORED, text, name, why)
         self._second_s = now_s

@@ -1,7 +1,7 @@
 """Switching the vehicle's mode, or arming it, and nothing against what it tells meanwhile.
 
 The command may be lost, and so may its COMMAND_ACK; what the vehicle did its HEARTBEAT tells for certain. One comes each second, and an operator may act
-between two of them, so they are asked for until the answer is known. HOLD is urgent: it is sent again every half second. Anything else is sent again only
+between two of them, so they are asked for until the answer is known. HOLD is urgent: it is sent again after a second in which nothing was heard. Anything else is sent again only
 after a heartbeat that shows the vehicle as it was when we asked, and not where none was heard for so long before that it may have been done and undone.
 Nothing is sent again once it was accepted, for what is shown afterwards is somebody else's doing, also where ACCEPTED alone does not tell that the vehicle is
 in the mode (PX4 1.17). Only HOLD is: it sets nothing going, and the answer may be that to a command of ours before.
@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from mavlink_bridge.mavlink.messages import Frame
     from mavlink_bridge.protocol.peer import Peer
 
-_HURRY_S = 0.5  # HOLD is sent again without waiting for heartbeats; chosen, not measured
+_HURRY_S = 1.0
+"""HOLD is sent again after so long without a heartbeat; where one shows that it was not done, at once. Chosen: over a slow link (0.8 s there and back, tested) the answer comes before."""
+
 _PATIENCE_S = 8.0  # for a heartbeat: of one a second seven may be lost; chosen, not measured
 _SETTLE_S = 0.5
 """A heartbeat that comes sooner after a command may have been sent before it."""
@@ -67,7 +69,7 @@ class SeenCommand(TableMachine[SwitchState, SwitchEvent]):
     is_stop : bool
         Whether it sets nothing going: then it is said again also after it was accepted.
     is_urgent : bool
-        Send it again every half second until it is answered.
+        Send it again after each second in which nothing is heard.
 
     Attributes
     ----------
@@ -246,7 +248,7 @@ class ModeSwitch(SeenCommand):
     mode : int
         HEARTBEAT.custom_mode, one of the peer's autopilot.
     is_urgent : bool
-        Send it again every half second until it is answered.
+        Send it again after each second in which nothing is heard.
     until_seen : bool
         Send it again until a heartbeat shows it: the answer may be that to another command.
     """

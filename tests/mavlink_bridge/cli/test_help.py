@@ -34,7 +34,10 @@ def test_help_loads_no_command_and_no_library():
     loaded = loaded_after("--help")
     assert not (LIBRARIES | RUNNERS | {"platformdirs", "tomllib"}) & loaded
     ours = {name for name in loaded if name.split(".")[0] in {"missions", "pbpp", "mavlink_bridge"}}
-    shared = {f"mavlink_bridge.cli{part}" for part in ("", ".app", ".common", ".failing", ".terminal")}
+    shared = {
+        f"mavlink_bridge.cli{part}"
+        for part in ("", ".app", ".common", ".failing", ".terminal", ".terminating")
+    }
     assert ours == shared | {
         "mavlink_bridge",
         "mavlink_bridge.errors",

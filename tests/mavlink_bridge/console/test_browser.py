@@ -274,7 +274,7 @@ def test_a_fence_is_drawn_corner_by_corner_with_keys_and_the_focus_is_never_lost
     page = watched.page
     page.get_by_role("tab", name="Fence").press("Enter")
     page.get_by_role("button", name="Edit this fence").press("Enter")
-    expect(page.get_by_role("button", name="Back to the held fence")).to_be_focused()
+    expect(page.get_by_role("button", name="Back to the vehicle's fence")).to_be_focused()
     page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="Edit this fence")).to_be_focused()
     page.get_by_role("button", name="Draw a polygon").press("Enter")

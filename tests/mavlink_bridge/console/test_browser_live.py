@@ -320,7 +320,7 @@ def test_a_server_started_anew_under_an_open_page(browser: Browser) -> None:
             seen.click_map(0.45, 0.4)
             seen.page.keyboard.press("Enter")
             expect(seen.page.locator("ol.plain > li")).to_have_count(10)
-            seen.page.get_by_role("button", name="Back to the held fence").click()
+            seen.page.get_by_role("button", name="Back to the vehicle's fence").click()
             seen.page.get_by_role("tab", name="Plan").click()
             # What was asked for is still there, and can be asked again.
             expect(seen.page.locator(HEADLINE)).to_have_text("✓ 2.50 m promised")
@@ -357,8 +357,9 @@ def test_a_page_that_stalls_changes_nothing_for_the_rover_and_says_so_when_it_re
         assert progress.text_content() != before  # it drives on
         debugger.send("Debugger.resume")
         debugger.detach()
-        page.wait_for_function("window.said.some((text) => text.includes('This page has lost pbpp'))")
         expect(page.locator(".alarm-bar")).to_be_hidden()
+        expect(page.locator(".chip-mode")).to_contain_text("AUTO")
+        assert any("This page has lost its connection" in text for text in page.evaluate("window.said"))
         expect(page.get_by_text("This page holds control")).to_be_visible()  # it was there all the time
         expect(page.locator(".chip-mode")).to_contain_text("AUTO")
         page.keyboard.press("h")

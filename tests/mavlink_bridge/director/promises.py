@@ -214,8 +214,10 @@ class Promises:
             return
         is_switch = isinstance(message, m.CommandLong) and message.command == Command.DO_SET_MODE
         is_hold = is_switch and self._modes.asked_for(message.param2, message.param3) == self._modes.hold
+        asks = isinstance(message, m.CommandLong) and message.command == Command.REQUEST_MESSAGE
+        is_holds = is_hold or (asks and message.param1 == 0.0)  # a heartbeat, which shows what became of HOLD
         is_uploads_end = isinstance(message, m.MissionAck | m.MissionRequestInt) and self._was_clashing
-        if is_uploads_end or self._run.director.state is State.CLASHING or is_hold:
+        if is_uploads_end or self._run.director.state is State.CLASHING or is_holds:
             return
         self._break(f"{type(message).__name__} after somebody spoke with our ids")
 

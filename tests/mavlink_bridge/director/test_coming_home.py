@@ -123,10 +123,9 @@ def test_the_first_rtl_is_answered_and_the_second_is_the_operators():
     assert left_alone(run, Mode.RTL)
     assert run.director.state is State.LET_GO
     assert len(texts(run, EventName.CALLED_HOME)) == 1
-    assert texts(run, EventName.CALL_IGNORED) == ["second RTL: left to you, it drives straight home"]
+    assert texts(run, EventName.CALL_IGNORED) == ["second RTL is yours: drives straight home"]
     assert any(  # also to who reads on the transmitter or in the ground station
-        isinstance(one, m.Statustext)
-        and one.text.endswith("second RTL: left to you, it drives straight home")
+        isinstance(one, m.Statustext) and one.text.endswith("second RTL is yours: drives straight home")
         for one in run.sent
     )
 

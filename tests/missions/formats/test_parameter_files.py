@@ -208,7 +208,7 @@ def test_a_remark_that_the_names_contradict_does_not_count() -> None:
     found = read("# Stack: PX4 Pro\nWP_SPEED 2\n", "f")
     assert found.ardupilot is True
     assert found.remarks == (
-        "f: a remark says that this is PX4 Pro, but its parameters are ArduPilot's: they count",
+        "f: a remark says that this is PX4 Pro, but its parameters are ArduPilot's: the parameters decide",
     )
 
 

@@ -383,16 +383,8 @@ class TestModes:
 
     def test_a_hold_that_is_said_again_unseen_says_so(self):
         script = Script(ModeSwitch(ON_1_17, PX4_MODES.hold, is_urgent=True))
-        sent = script.pass_time(0.6)
-        assert [one.command for one in sent] == [
-            512,
-            512,
-            512,
-            512,
-            512,
-            176,
-            512,
-        ]  # the question comes first
+        sent = script.pass_time(1.05)
+        assert [one.command for one in sent] == [*[512] * 9, 176]  # the question comes first
         assert script.machine.is_blind
         again = script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.mission), after_s=0.3)[-1]
         assert (again.command, again.confirmation) == (176, 2)
@@ -403,7 +395,7 @@ class TestModes:
         script = Script(ModeSwitch(ON_1_17, PX4_MODES.hold, is_urgent=True))
         if heard_s:
             script.hear(m.Heartbeat(10, 12, 157, PX4_MODES.mission), after_s=heard_s)
-        script.pass_time(0.55 - (heard_s or 0.0))
+        script.pass_time(1.05 - (heard_s or 0.0))
         assert script.machine.is_blind == (heard_s is None)
 
     def test_arming_is_known_by_the_heartbeat_too(self):

@@ -163,7 +163,7 @@ def all_travelled_m(
     return np.asarray(np.where(is_late, length_m - away_m, away_m))
 
 
-@lru_cache(maxsize=128)  # most of the lines that are tried have most legs in common; more keep memory, and save nothing
+@lru_cache(maxsize=128)  # lines that are tried have most legs in common; more save nothing
 def leg_profile(length_m: float, speed_mps: float, accel_mps2: float, jerk_mps3: float) -> LegProfile:
     """Return the motion along a leg: to the speed asked for, or as fast as half its length allows."""
     lag_s = accel_mps2 / jerk_mps3

@@ -83,7 +83,7 @@ def plans(browser: Browser, tiles: Path) -> None:
             seen.page.get_by_role("button", name="Waypoint 1.").focus()
             for _ in range(3):
                 seen.page.keyboard.press("Shift+ArrowDown")
-            expect(seen.page.locator(".headline")).to_contain_text("the promise")
+            expect(seen.page.locator(".headline")).to_contain_text("keep the clearance")
             shoot(seen.page, "console-check")
     with (
         serving("--fence", FENCE, "--start", START, "--map", str(tiles)) as server,

@@ -74,8 +74,9 @@ def plan_route(
     warnings += unenforced_warnings(vehicle, situation, plain)
     warnings += [*asked.warnings, *_start_remarks(plain, start, vehicle)]
     heading_deg = heading_at(situation, start)
-    sought, wanted = _sought(ground, (start, *targets), request, asked, should_stop), asked
-    asked, found = _route(sought, request, wanted, vehicle, heading_deg, compares=compares)
+    sought = _sought(ground, (start, *targets), request, asked, should_stop, compares=compares)
+    wanted = asked
+    asked, found = _route(sought, request, wanted, vehicle, heading_deg)
     if asked.promised_m < wanted.promised_m:
         warnings += stop_warnings(vehicle, asked)
     lines, drawn_m, band = _finished(ground, found, asked, vehicle, heading_deg)
@@ -123,10 +124,14 @@ def _sought(
     request: Request,
     asked: Promise,
     should_stop: Callable[[], bool] | None,
+    *,
+    compares: bool,
 ) -> Sought:
     start, *targets = (ground.frame.to_local(position) for position in ends)
     words = "" if request.widest else asked.words
-    return Sought(ground, start, targets, request.method, request.snap_m, request.escape, should_stop, words)
+    return Sought(
+        ground, start, targets, request.method, request.snap_m, request.escape, should_stop, words, compares
+    )
 
 
 def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:
@@ -136,13 +141,7 @@ def _less_info(request: Request, wanted: Promise, asked: Promise) -> list[str]:
 
 
 def _route(
-    sought: Sought,
-    request: Request,
-    asked: Promise,
-    vehicle: Vehicle,
-    heading_deg: float | None,
-    *,
-    compares: bool,
+    sought: Sought, request: Request, asked: Promise, vehicle: Vehicle, heading_deg: float | None
 ) -> tuple[Promise, DrivenRoute]:
     """Return the route and what is promised for it.
 
@@ -151,7 +150,7 @@ def _route(
     StartBlockedError, TargetBlockedError, NoRouteError
         There is none.
     """
-    found = _looked_for(sought, request, asked, vehicle, heading_deg, compares=compares)
+    found = _looked_for(sought, request, asked, vehicle, heading_deg)
     if isinstance(found, NoRoute):
         raise explained(found, vehicle).error()
     return found
@@ -159,13 +158,7 @@ def _route(
 
 @uncollected()
 def _looked_for(
-    sought: Sought,
-    request: Request,
-    asked: Promise,
-    vehicle: Vehicle,
-    heading_deg: float | None,
-    *,
-    compares: bool,
+    sought: Sought, request: Request, asked: Promise, vehicle: Vehicle, heading_deg: float | None
 ) -> Found | NoRoute:
     """Return the route and what is promised for it; else why there is none.
 
@@ -174,7 +167,7 @@ def _looked_for(
     """
     if asked.allowance_m is None:
         promised = PromisedRoute(sought, vehicle, heading_deg)
-        find, widest = partial(promised.find, compares=compares), promised.widest
+        find, widest = promised.find, promised.widest
     else:
         find, widest = partial(uniform_route, sought), partial(widest_uniform_route, sought)
     found = widest(asked) if request.widest else find(asked)

@@ -103,6 +103,8 @@ class Sought:
         Whether a start on forbidden ground is left by the shortest straight line that crosses no other forbidden ground.
     should_stop : callable, optional
         Asked now and then; True ends the search.
+    compares : bool
+        Whether a refusal for want of room names what the widest route keeps while driven; else what straight legs keep.
     """
 
     ground: Ground
@@ -113,6 +115,7 @@ class Sought:
     escape: bool = False
     should_stop: Callable[[], bool] | None = None
     asked: str = ""
+    compares: bool = True
     _narrowest: dict[tuple[LocalPoint, LocalPoint], NarrowestPlace | None] = field(
         default_factory=dict, init=False
     )

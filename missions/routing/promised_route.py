@@ -102,8 +102,8 @@ class PromisedRoute:
     _tried: dict[float, RouteSearch] = field(default_factory=dict, init=False)
     _known: SharedWork = field(default_factory=SharedWork, init=False)
 
-    def find(self, asked: Promise, *, compares: bool = True) -> Found | NoRoute:
-        """Return a route that keeps at least what is asked, and what is promised for it; else why there is none, compared with the widest or not."""
+    def find(self, asked: Promise) -> Found | NoRoute:
+        """Return a route that keeps at least what is asked, and what is promised for it; else why there is none."""
         found = self._fitted(asked)
         if isinstance(found, NoRoute) and found.at_start:
             found = self._search(asked.required_m, asked.required_m).nearer_start() or found
@@ -112,7 +112,7 @@ class PromisedRoute:
             return _promised(asked, found), found
         if found.kind is not NoRouteKind.TOO_NARROW or found.is_held:
             return found
-        return self._compared(found, asked) if compares else self._drawn_only(found)
+        return self._compared(found, asked) if self.sought.compares else self._drawn_only(found)
 
     def _fitted(self, asked: Promise) -> DrivenRoute | NoRoute:
         """Return a route that keeps at least what is asked; else why none was found."""

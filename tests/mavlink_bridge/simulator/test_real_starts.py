@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from drive_model.real_tracks import rows_of, track_of
 from simulator.station import HOME, at
 
 from mavlink_bridge.mavlink.rover import Mode
@@ -18,7 +17,6 @@ from missions.firmware import Firmware
 from missions.geo import LatLon, distance_m
 from missions.items import Command, MissionItem, waypoint
 
-DATA = Path(__file__).parents[2] / "missions" / "drive_model" / "data"
 FIRMWARE = {"2024-02": Firmware(4, 5), "2025-10": Firmware(4, 7, 0, 0)}
 FOLLOWED_M = 0.3
 AT_STOPS_FOLLOWED_M = 0.35
@@ -26,11 +24,6 @@ AT_STOPS_FOLLOWED_M = 0.35
 
 SHARPEST_FOLLOWED_DEG = 160.0
 """At sharper turns the simulated rover swings out up to 1.1 m farther than the real one."""
-
-
-def rows_of(name: str) -> list[dict[str, str]]:
-    with (DATA / name).open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def driven(
@@ -75,7 +68,7 @@ def starts() -> list[dict[str, str]]:
 @pytest.mark.parametrize("row", starts(), ids=lambda row: "-".join(list(row.values())[:6]))
 def test_a_start_swings_out_as_far(row: dict[str, str]) -> None:
     leg_m, speed_mps = float(row["leg_m"]), float(row["speed_mps"])
-    real = [tuple(map(float, pair.split(","))) for pair in row["track_m"].split()]
+    real = track_of(row).tolist()
     items = [waypoint(at(leg_m, 0)), waypoint(at(leg_m, float(row["onward_m"])))]
     places = driven(row, float(row["heading_off_deg"]), items, 30.0 / speed_mps + 14.0)
     simulated = [offset_m(place) for place in places]
@@ -111,7 +104,7 @@ def ahead_and_aside_m(row: dict[str, str], places: list[tuple[float, float]]) ->
 def test_a_turn_back_swings_out_as_far(row: dict[str, str]) -> None:
     leg_m, onward_m, speed_mps = (float(row[name]) for name in ("leg_m", "onward_m", "speed_mps"))
     turn = math.radians(float(row["turn_deg"]))
-    real = [tuple(map(float, pair.split(","))) for pair in row["track_m"].split()]
+    real = track_of(row).tolist()
     items = [
         replace(waypoint(at(leg_m, 0)), params=(float(row["delay_s"]), 0.0, 0.0, 0.0)),
         waypoint(at(leg_m + onward_m * math.cos(turn), onward_m * math.sin(turn))),

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-import shapely
+from drive_model.real_tracks import beyond_m, rows_of, track_of, vehicle_of
 
 from missions.drive_model import envelope
-from missions.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from missions.vehicle import Vehicle
 
 WITH_BAND_M = 0.15
 """So much beyond the corridor counts as inside it, as with the corners."""
@@ -18,33 +19,25 @@ WITH_BAND_M = 0.15
 
 def starts() -> list[tuple[Vehicle, float, list[tuple[float, float]], np.ndarray]]:
     """Return vehicle, heading, points and track of each start that goes on without stopping, east and north in metres."""
-    with (Path(__file__).parent / "data" / "short_starts.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["onward_m"] != "0" or float(row["leg_m"]) > 10]
     found = []
-    for row in rows:
+    for row in rows_of("short_starts.csv"):
+        if row["onward_m"] == "0" and float(row["leg_m"]) <= 10:
+            continue
         leg_m, onward_m = float(row["leg_m"]), float(row["onward_m"])
         points = [(0.0, 0.0), (0.0, leg_m), *([(onward_m, leg_m)] if onward_m else [])]
-        vehicle = Vehicle(
-            waypoint_radius_m=float(row["wp_radius_m"]),
-            speed_mps=float(row["speed_mps"]),
-            turn_radius_m=0.9,
-            has_measured_corners=row["firmware"] == "2025-10",
-        )
-        track = np.array([[float(one) for one in pair.split(",")] for pair in row["track_m"].split()])
-        found.append((vehicle, float(row["heading_off_deg"]), points, track))
+        found.append((vehicle_of(row), float(row["heading_off_deg"]), points, track_of(row)))
     return found
 
 
 def test_they_stay_in_the_corridor() -> None:
-    beyond_m = {}
+    left_m = {}
     for vehicle, heading_deg, points, track in starts():
-        corridor = shapely.union_all(envelope(np.array(points), vehicle, heading_deg=heading_deg).pieces)
-        away_m = float(shapely.distance(corridor, shapely.points(track)).max())
+        away_m = beyond_m(envelope(np.array(points), vehicle, heading_deg=heading_deg), track)
         if away_m > WITH_BAND_M:
-            beyond_m[
+            left_m[
                 vehicle.has_measured_corners, vehicle.speed_mps, points[1][1], heading_deg, len(points)
             ] = away_m
-    assert beyond_m == {}
+    assert left_m == {}
 
 
 @pytest.mark.parametrize("is_new", [True, False])

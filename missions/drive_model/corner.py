@@ -47,6 +47,9 @@ TURN_BACK_SWING = 1.28
 TURN_BACK_BEHIND = 0.6
 """At 180° it comes so much of that behind its waypoint, 2.08 m at 1 m/s; a quarter up to 168° (tests/missions/drive_model/data/turns_back.csv)."""
 
+EARLY_BEHIND_MORE = 0.25
+"""So much more before 4.6: half of what it swings out up to 168°."""
+
 SLOW_MPS = 1.0
 SLOW_SKID_SWING_M, SLOW_SKID_TURN_DEG = 0.3, 45.0
 """Slower skid-steered rovers swing out so far at corners that they do not pivot at: 0.49 m after 45° at 0.2 to 0.5 m/s, band included; at gentler ones less."""
@@ -238,9 +241,10 @@ def corner_swing_m(vehicle: Vehicle, bend: Bend, reach_m: float) -> float:
     return max(float(swing_m), slow_m)
 
 
-def behind_share(turn_deg: float) -> float:
+def behind_share(vehicle: Vehicle, turn_deg: float) -> float:
     """Return how far behind its waypoint a rover comes, as a share of what it swings out."""
-    return _interpolated(abs(turn_deg), TURN_BACK_DEG, (0.25, TURN_BACK_BEHIND))
+    share = _interpolated(abs(turn_deg), TURN_BACK_DEG, (0.25, TURN_BACK_BEHIND))
+    return share + EARLY_BEHIND_MORE if is_early(vehicle) else share
 
 
 def swing_hold_s(vehicle: Vehicle, swing_m: float, *, stopped: bool, pivots: bool) -> float:

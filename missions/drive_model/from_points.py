@@ -191,14 +191,13 @@ def _corner(
     else:
         blend = at_corner.blend(vehicle, before, after, turn_deg)
         swing_m = at_corner.corner_swing_m(vehicle, bend, blend.reach_m)
-        behind_m = swing_m * at_corner.behind_share(turn_deg)
         if vehicle.pursuit is not None and abs(turn_deg) > at_pursuit.EITHER_SIDE_DEG:
             either_m = swing_m
         if at_corner.is_early(vehicle):
             swing = at_corner.early_swing(vehicle, bend)
             swing_m = swing.outside_m
-            behind_m = swing_m * (0.25 + at_corner.behind_share(turn_deg))
             tail = Stray(swing.later_outside_m, swing.later_inside_m).seen_from(turn_deg)
+        behind_m = swing_m * at_corner.behind_share(vehicle, turn_deg)
     more = corner_more(vehicle, turn_deg, bend.speed_mps, stands=stopped or pivots)
     holds_s = at_corner.swing_hold_s(vehicle, swing_m, stopped=stopped, pivots=pivots)
     swing_m = max(0.0, swing_m + min(more.outside_m, 0.0))
